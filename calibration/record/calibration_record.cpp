@@ -19,9 +19,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kChecksum = "checksum";
-constexpr const char* kSigned = "signed";
-
 template <typename Matrix>
 Json rows_of(const Matrix& matrix) {
   Json rows = Json::array();
@@ -217,7 +214,7 @@ Json json_of(const CalibrationRecord& record) {
 }
 
 std::string with_checksum(Json json) {
-  json[kChecksum] = checksum_of(json.dump());
+  json[kChecksumKey] = checksum_of(json.dump());
   return json.dump(2) + "\n";
 }
 
@@ -237,7 +234,7 @@ std::string record_text(const CalibrationRecord& record) {
 
 std::string record_text(const CalibrationRecord& record, const FileSignature& signature) {
   Json json = json_of(record);
-  json[kSigned] = json_of_signature(signature);
+  json[kSignedKey] = json_of_signature(signature);
   return with_checksum(std::move(json));
 }
 
@@ -262,8 +259,8 @@ Result<SignedRecord> parse_signed_record(const std::string& text) {
                                                json.value("version", Json()).dump(), CalibrationRecord::kVersion)};
   }
   Json told = json;
-  told.erase(kChecksum);
-  const Json checksum = json.value(kChecksum, Json());
+  told.erase(kChecksumKey);
+  const Json checksum = json.value(kChecksumKey, Json());
   if (!checksum.is_string() || !has_checksum(told.dump(), checksum.get<std::string>())) {
     return Error{Errc::bad_format,
                  "the calibration record's checksum does not fit: it was damaged or changed by hand; calibrate again"};
@@ -275,8 +272,8 @@ Result<SignedRecord> parse_signed_record(const std::string& text) {
   }
   try {
     SignedRecord out{record_of(json), "", std::nullopt, checksum.get<std::string>().starts_with("crc64")};
-    if (told.contains(kSigned)) out.signature = signature_of_json(told.at(kSigned));
-    told.erase(kSigned);
+    if (told.contains(kSignedKey)) out.signature = signature_of_json(told.at(kSignedKey));
+    told.erase(kSignedKey);
     out.sha256 = sha256_of(told.dump());
     return out;
   } catch (const std::exception& problem) {

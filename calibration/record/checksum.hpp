@@ -4,6 +4,8 @@
 
 namespace birdseye::calibration {
 
+inline constexpr const char* kChecksumKey = "checksum";  ///< under which a file has it
+
 /// The checksum of what a JSON file says: SHA-256 over its text without white space, so that the file may be laid out
 /// anew but not changed.
 std::string checksum_of(const std::string& json_text);

@@ -8,13 +8,13 @@
 #include "calibration/base/nesting.hpp"
 #include "calibration/record/checksum.hpp"
 #include "calibration/record/field_map_json.hpp"
+#include "calibration/record/sha256.hpp"
 #include "calibration/record/strict_json.hpp"
 
 namespace birdseye::calibration {
 
 namespace {
 
-constexpr const char* kFieldMapFormat = "birdseye field map";
 constexpr int kVersion = 1;
 
 std::optional<Grade> grade_of(const std::string& name) {
@@ -40,7 +40,16 @@ Result<FieldMapFile> map_of(const nlohmann::json& json) {
   notes.grade = *grade;
   auto map = FieldMap::from(json.at("map").get<FieldMapData>());
   if (!map) return map.error();
-  return FieldMapFile{*std::move(map), std::move(notes)};
+  return FieldMapFile{*std::move(map), std::move(notes), "", std::nullopt};
+}
+
+nlohmann::json json_of(const FieldMap& map, const FieldMapNotes& notes) {
+  nlohmann::json json{{"format", kFieldMapFormat},        {"version", kVersion},
+                      {"made_utc", notes.made_utc},       {"software", notes.software},
+                      {"made_from", notes.made_from},     {"verdict", name_of(notes.grade)},
+                      {"held_out_mm", notes.held_out_mm}, {"map", map.data()}};
+  if (!notes.tracker.empty()) json["tracker"] = notes.tracker;
+  return json;
 }
 
 }  // namespace
@@ -57,13 +66,15 @@ std::string field_misfit(const Identity& of_map, const Identity& tracker) {
   return why.empty() ? why : why + ": map this tracker's field (birdseye calibrate field --bind HOST:PORT)";
 }
 
-std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes) {
-  nlohmann::json json{{"format", kFieldMapFormat},        {"version", kVersion},
-                      {"made_utc", notes.made_utc},       {"software", notes.software},
-                      {"made_from", notes.made_from},     {"verdict", name_of(notes.grade)},
-                      {"held_out_mm", notes.held_out_mm}, {"map", map.data()}};
-  if (!notes.tracker.empty()) json["tracker"] = notes.tracker;
-  json["checksum"] = checksum_of(json.dump());
+std::string signed_sha256(const FieldMap& map, const FieldMapNotes& notes) {
+  return sha256_of(json_of(map, notes).dump());
+}
+
+std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes,
+                           const std::optional<FileSignature>& signature) {
+  nlohmann::json json = json_of(map, notes);
+  if (signature) json[kSignedKey] = json_of_signature(*signature);
+  json[kChecksumKey] = checksum_of(json.dump());
   return json.dump(1) + "\n";
 }
 
@@ -77,13 +88,20 @@ Result<FieldMapFile> parse_field_map(const std::string& text) {
       return no_map("it does not say that it is one");
     if (json.at("version").get<int>() != kVersion)
       return no_map(fmt::format("or of a version other than {}", kVersion));
-    const auto checksum = json.at("checksum").get<std::string>();
-    json.erase("checksum");
+    const auto checksum = json.at(kChecksumKey).get<std::string>();
+    json.erase(kChecksumKey);
     if (!has_checksum(json.dump(), checksum))
       return no_map("or was changed since it was made: its checksum does not fit");
     if (!is_strict)
       return no_map("or was changed since it was made: it says something twice, or goes on behind its end");
-    return map_of(json);
+    std::optional<FileSignature> signature;
+    if (json.contains(kSignedKey)) signature = signature_of_json(json.at(kSignedKey));
+    json.erase(kSignedKey);
+    auto out = map_of(json);
+    if (!out) return out.error();
+    out->sha256 = sha256_of(json.dump());
+    out->signature = std::move(signature);
+    return out;
   } catch (const std::exception&) {  // of the parser's many kinds, and a map's own
     return no_map("or not a whole one");
   }

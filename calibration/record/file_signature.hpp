@@ -21,6 +21,7 @@ std::string signed_words(std::string_view kind, std::string_view sha256, const F
 /// As which kind birdseyed signs its recordings, which hosts verify.
 inline constexpr const char* kApplianceRecordingFormat = "birdseye appliance recording";
 
+inline constexpr const char* kSignedKey = "signed";  ///< under which a file has it
 nlohmann::json json_of_signature(const FileSignature& signature);
 /// Throws what nlohmann throws where it is none, or more than one.
 FileSignature signature_of_json(const nlohmann::json& json);

@@ -222,29 +222,49 @@ std::string why_unread(const std::string& path, const Error& error) {
   return path + ": cannot be read; see whether it is there, its owner and mode";
 }
 
-void read_field_map(const std::string& path, ConfigSection& section, Config& config) {
-  const auto text = read_whole_file(path, kMostFieldBytes);
-  if (!text) return section.fail("field", why_unread(path, text.error()));
-  auto parsed = calibration::parse_field_map(*text);
-  if (!parsed) return section.fail("field", parsed.error().with_context(path).what);
-  config.core.field = std::move(parsed->map);
-  config.core.field_of = std::move(parsed->notes.tracker);
-}
+/// A file of [calibration] that a machine signs.
+struct SignedFile {
+  const std::string& path;
+  const char* what;  ///< "record"
+  const char* kind;
+  const std::string& sha256;
+  const std::optional<calibration::FileSignature>& signature;
+};
 
-/// Why birdseyed does not use the record; empty where it may. An error: it is not as it was signed. Whoever is not
-/// known stops no appliance: poses and video need no record.
-Result<std::string> refusal_of(const calibration::SignedRecord& record, const std::string& path) {
+/// Why birdseyed does not use the file; empty where it may. An error: it is not as it was signed. Whoever is not known
+/// stops no appliance: video needs neither of these files.
+Result<std::string> refusal_of(const SignedFile& file) {
+  const std::string& path = file.path;
   const auto folder = identity_folder();
   const auto machine = folder ? ThisMachine::open(*folder) : Result<ThisMachine>(folder.error());
   if (!machine) return fmt::format("{}: whose it is cannot be told: {}", path, machine.error().what);
-  const auto author = machine->author_of(calibration::kRecordFormat, record.sha256, record.signature);
+  const auto author = machine->author_of(file.kind, file.sha256, file.signature);
   if (!author) return author.error();
   if (author->standing == Author::Standing::known) return std::string();
-  const std::string is = fmt::format("{}: the record is {}; [calibration] accept_unsigned = true uses it all the same",
-                                     path, author->words());
+  const std::string is = fmt::format("{}: the {} is {}; [calibration] accept_unsigned = true uses it all the same",
+                                     path, file.what, author->words());
   if (author->standing == Author::Standing::nobody) return is;
   return fmt::format("{}; to know that machine, add the line \"NAME {}\" to {}", is, author->key.hex(),
                      (*folder / "known").string());
+}
+
+void read_field_map(const std::string& path, bool accept_unsigned, ConfigSection& section, Config& config) {
+  const auto text = read_whole_file(path, kMostFieldBytes);
+  if (!text) return section.fail("field", why_unread(path, text.error()));
+  auto read = calibration::parse_field_map(*text);
+  if (!read) return section.fail("field", read.error().with_context(path).what);
+  auto refusal = refusal_of({path, "map of the field", calibration::kFieldMapFormat, read->sha256, read->signature});
+  if (!refusal) return section.fail("field", refusal.error().with_context(path).what);
+  config.core.field = std::move(read->map);
+  config.core.field_of = std::move(read->notes.tracker);
+  if (refusal->empty()) return;
+  if (!accept_unsigned) {
+    config.core.field_refused = *std::move(refusal);
+    return;
+  }
+  std::string& notice = config.core.notice;
+  notice += std::string(notice.empty() ? "" : "; ") +
+            "UNSIGNED: poses are corrected by a map of the field that no known machine signed";
 }
 
 void read_calibration_record(const std::string& path, bool accept_unsigned, ConfigSection& section, Config& config) {
@@ -254,7 +274,7 @@ void read_calibration_record(const std::string& path, bool accept_unsigned, Conf
   if (!text) return section.fail("record", why_unread(path, text.error()));
   const auto record = calibration::parse_signed_record(*text);
   if (!record) return section.fail("record", record.error().with_context(path).what);
-  auto refusal = refusal_of(*record, path);
+  auto refusal = refusal_of({path, "record", calibration::kRecordFormat, record->sha256, record->signature});
   if (!refusal) return section.fail("record", refusal.error().with_context(path).what);
   config.core.calibration = *text;
   if (!accept_unsigned) config.core.calibration_refused = *std::move(refusal);
@@ -266,7 +286,7 @@ void read_calibration(ConfigSection& section, Config& config) {
   section.text("record", record);
   bool accept_unsigned = false;
   section.flag("accept_unsigned", accept_unsigned);
-  if (!field.empty()) read_field_map(field, section, config);
+  if (!field.empty()) read_field_map(field, accept_unsigned, section, config);
   if (!record.empty()) read_calibration_record(record, accept_unsigned, section, config);
 }
 

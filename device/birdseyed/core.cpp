@@ -69,7 +69,10 @@ void Core::note(const InstrumentChanged& changed) {
   calibration_.note(changed);
   const bool running = changed.state == InstrumentState::running;
   if (changed.instrument == Instrument::tracker) {
-    if (running && settings_.field) field_fault_ = calibration::field_misfit(settings_.field_of, changed.identity);
+    if (running && settings_.field) {
+      field_fault_ = settings_.field_refused.empty() ? calibration::field_misfit(settings_.field_of, changed.identity)
+                                                     : settings_.field_refused;
+    }
     // What was half received will not be completed, and a unit that starts again has another beat.
     if (assembler_) {
       add(counted_, assembler_->counters());

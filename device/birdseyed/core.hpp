@@ -29,6 +29,7 @@ struct CoreSettings {
   std::string calibration_refused;             ///< why it is not used: nobody known signed it; empty: it may be
   std::optional<calibration::FieldMap> field;  ///< corrects every pose; poses outside the mapped volume are doubted
   calibration::Identity field_of;  ///< the tracker whose field that is; of another every pose is doubted. Empty: any
+  std::string field_refused;       ///< why the map is not used, and every pose doubted: nobody known signed it
 };
 
 /// What the appliance knows and says. Pure: the same events in the same order give the same packets, byte for byte.

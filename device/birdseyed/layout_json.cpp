@@ -74,6 +74,7 @@ void to_json(nlohmann::json& json, const CoreSettings& settings) {
   if (!settings.calibration_refused.empty()) json["calibration_refused"] = settings.calibration_refused;
   if (!settings.notice.empty()) json["notice"] = settings.notice;
   if (!settings.field_of.empty()) json["field_of"] = settings.field_of;
+  if (!settings.field_refused.empty()) json["field_refused"] = settings.field_refused;
 }
 void from_json(const nlohmann::json& json, CoreSettings& settings) {
   json.at("bird_names").get_to(settings.bird_names);
@@ -85,6 +86,7 @@ void from_json(const nlohmann::json& json, CoreSettings& settings) {
   settings.calibration_refused = json.value("calibration_refused", "");
   settings.notice = json.value("notice", "");
   if (json.contains("field_of")) json.at("field_of").get_to(settings.field_of);
+  settings.field_refused = json.value("field_refused", "");
   if (!json.contains("field")) return;
   auto map = calibration::FieldMap::from(json.at("field").get<calibration::FieldMapData>());
   if (!map) throw std::invalid_argument(map.error().what);

@@ -168,7 +168,9 @@ int main(int argc, char** argv) {
     if (check_only) {
       const auto config = device::read_config(config_path);
       if (!config) return refuse(config.error());
-      if (!config->core.calibration_refused.empty()) print_error("birdseyed", config->core.calibration_refused);
+      for (const std::string& refused : {config->core.calibration_refused, config->core.field_refused}) {
+        if (!refused.empty()) print_error("birdseyed", refused);
+      }
       fmt::print("{}: sound\n", config_path.string());
       if (const std::string who = device::admission_words(config->wire); !who.empty()) fmt::print("{}\n", who);
       return 0;

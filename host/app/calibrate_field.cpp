@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/record/field_map_file.hpp"
+#include "drivers/identity/this_machine.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/program.hpp"
 #include "host/app/calibrate_commands.hpp"
@@ -41,9 +42,8 @@ struct Fitted {
 };
 
 Result<Fitted> fit_pairs(const CalibrateFieldOptions& options, const std::optional<calibration::FieldBasis>& basis) {
-  auto how = pose_reading(options.poses_are);
-  if (!how) return how.error();
-  PoseFile a{options.pair[0], *how}, b{options.pair[1], *how};
+  const PoseReading how = pose_reading(options.poses_are, std::nullopt);
+  PoseFile a{options.pair[0], how}, b{options.pair[1], how};
   if (options.tools.size() == 1)
     return Error{Errc::bad_value, "--tool: with --pair give it twice, for the first file and for the second"};
   if (!options.tools.empty()) {
@@ -60,14 +60,13 @@ Result<Fitted> fit_pairs(const CalibrateFieldOptions& options, const std::option
 
 Result<Fitted> fit_places(const CalibrateFieldOptions& options, const std::optional<calibration::FieldBasis>& basis) {
   const auto read = [&]() -> Result<FieldSamples> {
-    auto how = pose_reading(options.poses_are);
-    if (!how) return how.error();
-    if (!options.grid.empty()) return read_field_grid(options.grid, options.held_alike, how->mm_per_unit);
+    PoseReading how = pose_reading(options.poses_are, std::nullopt);
+    if (!options.grid.empty()) return read_field_grid(options.grid, options.held_alike, how.mm_per_unit);
     if (options.tools.size() > 1) return Error{Errc::bad_value, "--tool: with --poses give it once"};
-    if (!options.tools.empty()) how->transform = options.tools[0];
+    if (!options.tools.empty()) how.transform = options.tools[0];
     const auto spec = parse_grid_spec(options.grid_spec);
     if (!spec) return spec.error();
-    return read_field_poses(options.poses, *spec, options.held_alike, *how);
+    return read_field_poses(options.poses, *spec, options.held_alike, how);
   };
   auto samples = read();
   if (!samples) return samples.error();
@@ -200,10 +199,14 @@ void run(const CLI::App& field, const CalibrateFieldOptions& options, CommandSta
   const Verdict verdict = verdict_of(fitted->fit);
   fmt::print("{} of order {}: {:.2f} mm before, {:.2f} mm after, held out\n", name_of(fitted->fit.chosen.basis),
              fitted->fit.chosen.order, fitted->fit.before_mm, fitted->fit.held_out_mm);
+  const auto machine = ThisMachine::open();
+  if (!machine) return status.refuse(machine.error());
   const calibration::FieldMapNotes notes{
       utc_now(),     "birdseye " BIRDSEYE_VERSION, fitted->made_from,
       verdict.grade, fitted->fit.held_out_mm,      calibration::field_of_tracker(tracker)};
-  finish_calibration(options.results, field_map_text(fitted->fit.map, notes), json_of(*fitted), page_of(*fitted),
+  const calibration::FieldMap& map = fitted->fit.map;
+  const auto signature = machine->sign(calibration::kFieldMapFormat, signed_sha256(map, notes));
+  finish_calibration(options.results, field_map_text(map, notes, signature), json_of(*fitted), page_of(*fitted),
                      verdict, status);
 }
 

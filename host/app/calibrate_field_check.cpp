@@ -34,6 +34,9 @@ Result<std::vector<CheckedPlace>> places_of(const CalibrateFieldCheckOptions& op
   if (!options.field.empty()) {
     auto read = read_field_map(options.field);
     if (!read) return read.error();
+    if (auto noted = note_author(options.field.string(), calibration::kFieldMapFormat, read->sha256, read->signature);
+        !noted)
+      return noted.error();
     map = std::move(read->map);
   }
   std::vector<CheckedPlace> out;

@@ -117,27 +117,25 @@ Result<void> check(const CalibrateHandEyeOptions& options) {
 
 /// How the files of poses are to be read. What the camera saw is not the tracker's, and no map of its field corrects
 /// it.
-Result<void> read_how(CalibrateHandEyeOptions& options) {
-  const auto how = pose_reading(options.poses_are);
-  if (!how) return how.error();
+void read_how(CalibrateHandEyeOptions& options, const AdmittedField& field) {
+  const PoseReading how = pose_reading(options.poses_are, field.map);
   HandEyeFiles& files = options.files;
   for (PoseReading* tracked : {&files.of_sensor, &files.of_board}) {
-    tracked->mm_per_unit = how->mm_per_unit;
-    tracked->unit_said = how->unit_said;
-    tracked->s_per_unit = how->s_per_unit;
-    tracked->column_major = how->column_major;
-    tracked->inverted = how->inverted;
-    tracked->field = how->field;
-    tracked->most_error_mm = how->most_error_mm;
+    tracked->mm_per_unit = how.mm_per_unit;
+    tracked->unit_said = how.unit_said;
+    tracked->s_per_unit = how.s_per_unit;
+    tracked->column_major = how.column_major;
+    tracked->inverted = how.inverted;
+    tracked->field = how.field;
+    tracked->most_error_mm = how.most_error_mm;
   }
   files.of_board.option_prefix = "board-";
   files.of_eye.option_prefix = "eye-";
-  files.of_eye.mm_per_unit = mm_per(options.eye_unit).value_or(how->mm_per_unit);
-  files.of_eye.unit_said = how->unit_said || !options.eye_unit.empty();
-  files.of_eye.s_per_unit = options.eye_time_unit.empty() ? how->s_per_unit : seconds_per(options.eye_time_unit);
-  files.of_eye.column_major = how->column_major;
+  files.of_eye.mm_per_unit = mm_per(options.eye_unit).value_or(how.mm_per_unit);
+  files.of_eye.unit_said = how.unit_said || !options.eye_unit.empty();
+  files.of_eye.s_per_unit = options.eye_time_unit.empty() ? how.s_per_unit : seconds_per(options.eye_time_unit);
+  files.of_eye.column_major = how.column_major;
   files.of_eye.inverted = options.eye_direction == "camera_from_marker";
-  return {};
 }
 
 /// A hand-eye goes into a record beside the lens it was made with, and no other.
@@ -260,7 +258,9 @@ void run(const CLI::App& command, CalibrateHandEyeOptions& options, CommandStatu
   files.pixel_aspect = *aspect;
   if (const auto sound = check(options); !sound) return status.refuse(sound.error());
   if (const auto used = check_use(command, options); !used) return status.refuse(used.error());
-  if (const auto read = read_how(options); !read) return status.refuse(read.error());
+  const auto field = admit_field(options.poses_are.field, options.results);
+  if (!field) return status.refuse(field.error());
+  read_how(options, *field);
   if (const auto sound = check_record(options); !sound) return status.refuse(sound.error());
   if (!options.at.empty())
     files.at_mm = files.of_eye.mm_per_unit * Eigen::Vector3d(options.at[0], options.at[1], options.at[2]);
@@ -287,7 +287,7 @@ void run(const CLI::App& command, CalibrateHandEyeOptions& options, CommandStatu
   recording->eye_inverted = files.of_eye.inverted;
   auto found = solve_hand_eye(*recording, angles, !files.eye_poses.empty());
   if (!found) return status.refuse(found.error());
-  tell_doubt(*source, found->verdict);
+  tell_doubts(*source, *field, found->verdict);
   finish(options, *recording, *found, status);
 }
 
@@ -377,7 +377,7 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
   command->add_option("--seconds", plan.seconds, "with --live: then it ends in any case (default 300)")
       ->check(CLI::Range(5.0, 7200.0));
   add_result_options(*command, options->results, "camera_from_sensor, a 4x4 matrix, mm");
-  allow_unsigned_recording(*command);
+  allow_unsigned_sources(*command);
   command->callback([options, command, &status] { run(*command, *options, status); });
 }
 

@@ -114,26 +114,25 @@ std::vector<calibration::TimedRotation> rotations_of(const PoseSet& set) {
   return rows;
 }
 
-Result<LatencyFound> of_files(const CalibrateLatencyOptions& options, Verdict& odd) {
-  auto how = pose_reading(options.poses_are);
-  if (!how) return how.error();
-  how->transform = options.transform;
-  const auto a = read_timed(options.poses, *how, odd);
+Result<LatencyFound> of_files(const CalibrateLatencyOptions& options, const AdmittedField& field, Verdict& odd) {
+  PoseReading how = pose_reading(options.poses_are, field.map);
+  how.transform = options.transform;
+  const auto a = read_timed(options.poses, how, odd);
   if (!a) return a.error();
-  const auto sensor_s_per_unit = how->s_per_unit;
-  if (!options.eye_time_unit.empty()) how->s_per_unit = seconds_per(options.eye_time_unit);
-  how->transform = options.eye_transform;
-  how->option_prefix = "eye-";
-  how->field.reset();
-  how->inverted = false;
-  how->most_error_mm.reset();  // what the camera saw is not the tracker's
-  const auto b = read_timed(options.eye_poses, *how, odd);
+  const auto sensor_s_per_unit = how.s_per_unit;
+  if (!options.eye_time_unit.empty()) how.s_per_unit = seconds_per(options.eye_time_unit);
+  how.transform = options.eye_transform;
+  how.option_prefix = "eye-";
+  how.field.reset();
+  how.inverted = false;
+  how.most_error_mm.reset();  // what the camera saw is not the tracker's
+  const auto b = read_timed(options.eye_poses, how, odd);
   if (!b) return b.error();
   if (auto two = refuse_alike(options.poses, *a, options.eye_poses, *b); !two) return two.error();
   auto latency = calibration::find_latency(rotations_of(*a), rotations_of(*b), options.settings);
   if (!latency) {
     const TimedFile of_sensor{options.poses.string(), "--time-unit", *a, sensor_s_per_unit.value_or(1)};
-    const TimedFile of_eye{options.eye_poses.string(), "--eye-time-unit", *b, how->s_per_unit.value_or(1)};
+    const TimedFile of_eye{options.eye_poses.string(), "--eye-time-unit", *b, how.s_per_unit.value_or(1)};
     if (const std::string hint = hint_on_time_units(of_sensor, of_eye); !hint.empty())
       return Error{Errc::bad_value, hint};
     return Error{latency.error().code, latency.error().what + " (a: --poses, b: --eye-poses)"};
@@ -190,12 +189,14 @@ void run(const CLI::App& command, const CalibrateLatencyOptions& options, Comman
   }
   const auto recording = admit_source(options.recording, options.paths);
   if (!recording) return status.refuse(recording.error());
-  const auto found = files ? of_files(options, odd) : of_appliance(options, *recording, progress);
+  const auto field = admit_field(options.poses_are.field, options.paths);
+  if (!field) return status.refuse(field.error());
+  const auto found = files ? of_files(options, *field, odd) : of_appliance(options, *recording, progress);
   if (!found) return status.refuse(found.error());
   Verdict verdict = calibration::latency_verdict(found->latency, found->names.a, found->names.b);
   for (const std::string& reason : odd.reasons) verdict.add(Grade::pass, reason);
   found->drops.tell(verdict);
-  tell_doubt(*recording, verdict);
+  tell_doubts(*recording, *field, verdict);
   if (verdict.grade != Grade::fail) {
     const Latency& l = found->latency;
     fmt::print("offset {:.2f} ms (95 %: {:.2f} to {:.2f}), drift {:.1f} ppm (95 %: {:.1f} to {:.1f})\n{}\n",
@@ -244,7 +245,7 @@ void add_calibrate_latency(CLI::App& calibrate, CommandStatus& status) {
   add_eye_time_unit(command, options->eye_time_unit);
   command.add_flag("--no-drift", options->no_drift, "both clocks are known to run at one rate");
   add_result_options(command, options->paths, "offset and drift (TOML)");
-  allow_unsigned_recording(command);
+  allow_unsigned_sources(command);
   command.callback([options, &command, &status] {
     options->settings.find_drift = !options->no_drift;
     run(command, *options, status);

@@ -32,13 +32,13 @@ struct CalibrateTipOptions {
   ResultPaths results;
 };
 
-Result<PoseSet> read_set(const CalibrateTipOptions& options, const std::filesystem::path& path) {
-  auto how = pose_reading(options.poses_are);
-  if (!how) return how.error();
-  how->transform = options.transform;
-  how->reference = options.reference;
-  how->body = options.body;
-  return read_pose_set(path, *how);
+Result<PoseSet> read_set(const CalibrateTipOptions& options, const AdmittedField& field,
+                         const std::filesystem::path& path) {
+  PoseReading how = pose_reading(options.poses_are, field.map);
+  how.transform = options.transform;
+  how.reference = options.reference;
+  how.body = options.body;
+  return read_pose_set(path, how);
 }
 
 /// Refuses, by its name, what was given and would be of no effect.
@@ -54,14 +54,14 @@ Result<void> check(const CLI::App& tip, const CalibrateTipOptions& options) {
                       "goes with --poses or --spin");
 }
 
-Result<TipInput> read_input(const CalibrateTipOptions& options) {
+Result<TipInput> read_input(const CalibrateTipOptions& options, const AdmittedField& field) {
   if (!options.server.empty()) {
     if (const auto fits = check_bound_record(options.results.record, options.server, {"tracker"}); !fits)
       return fits.error();
   }
   Progress progress;
   auto set = options.poses.empty() ? collect_poses(options.server, options.bird, options.seconds, progress)
-                                   : read_set(options, options.poses);
+                                   : read_set(options, field, options.poses);
   if (!set) return set.error();
   std::vector<Phase> phases;
   if (!options.phases.empty()) {
@@ -77,7 +77,7 @@ Result<TipInput> read_input(const CalibrateTipOptions& options) {
   input->inverted = options.poses_are.direction == "sensor_from_tracker" && !options.poses.empty();
   input->source = options.poses.empty() ? options.server : options.poses.filename().string();
   if (!options.spin.empty()) {
-    auto spin = read_set(options, options.spin);
+    auto spin = read_set(options, field, options.spin);
     if (!spin) return spin.error();
     input->spin = *std::move(spin);
   }
@@ -146,16 +146,18 @@ void add_calibrate_tip(CLI::App& calibrate, CommandStatus& status) {
   tip.add_option("--spin", options->spin, "poses while the pointer is spun about its shaft: gives its axis, too");
   add_pose_options(tip, options->poses_are);
   add_result_options(tip, options->results, "the tip, x y z in the sensor's frame, mm");
-  allow_unsigned_recording(tip);
+  allow_unsigned_sources(tip);
   tip.callback([options, &tip, &status] {
     if (const auto fine = check(tip, *options); !fine) return status.refuse(fine.error());
     const auto source = admit_source(options->poses, options->results);
     if (!source) return status.refuse(source.error());
-    const auto input = read_input(*options);
+    const auto field = admit_field(options->poses_are.field, options->results);
+    if (!field) return status.refuse(field.error());
+    const auto input = read_input(*options, *field);
     if (!input) return status.refuse(input.error());
     auto found = calibrate_tip(*input);
     if (!found) return status.refuse(found.error());
-    tell_doubt(*source, found->verdict);
+    tell_doubts(*source, *field, found->verdict);
     print(*found, *input);
     finish_calibration(options->results, tip_text(*found), tip_json(*found, *input), tip_page(*found, *input),
                        found->verdict, status, entry_of(*found, *input));

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "host/files/column_names.hpp"
-#include "host/files/field_files.hpp"
 
 namespace birdseye::host {
 
@@ -68,7 +68,7 @@ void add_pose_options(CLI::App& command, PoseOptions& options) {
       ->check(CLI::Range(0.001, 1000.0));
 }
 
-Result<PoseReading> pose_reading(const PoseOptions& options) {
+PoseReading pose_reading(const PoseOptions& options, std::optional<calibration::FieldMap> field) {
   PoseReading how;
   how.mm_per_unit = mm_per(options.unit).value_or(1);
   how.unit_said = !options.unit.empty();
@@ -76,10 +76,7 @@ Result<PoseReading> pose_reading(const PoseOptions& options) {
   how.column_major = options.column_major;
   how.inverted = options.direction == "sensor_from_tracker";
   how.most_error_mm = options.most_error_mm;
-  if (options.field.empty()) return how;
-  auto map = read_field_map(options.field);
-  if (!map) return map.error();
-  how.field = std::move(map->map);
+  how.field = std::move(field);
   return how;
 }
 

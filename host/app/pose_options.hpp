@@ -37,8 +37,8 @@ void add_eye_unit(CLI::App& command, std::string& unit);
 /// Adds these and `--field` and `--max-error`. options must outlive the command's parsing.
 void add_pose_options(CLI::App& command, PoseOptions& options);
 
-/// Refuses a map of the field that cannot be read.
-Result<PoseReading> pose_reading(const PoseOptions& options);
+/// field: the map of `--field`, which the command has admitted; none: poses are as recorded.
+PoseReading pose_reading(const PoseOptions& options, std::optional<calibration::FieldMap> field);
 
 /// Refuses the first of these options that was given, by its name, for it would be of no effect. why: "goes with
 /// --server".

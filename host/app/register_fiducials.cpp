@@ -17,6 +17,7 @@
 #include "host/files/registration_file.hpp"
 #include "host/files/write_files.hpp"
 #include "host/overlay/ct_sha256.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -58,7 +59,9 @@ Result<ExitCode> run(const RegisterFiducialsOptions& options) {
   if (!input) return input.error();
   const auto out = register_fiducials(options.files, *input);
   if (!out) return out.error();
-  const Verdict verdict = judge_fiducials(*out);
+  Verdict verdict = judge_fiducials(*out);
+  if (const std::string& doubt = input->field_doubt; !doubt.empty())
+    verdict.add(Grade::marginal, words("why_unsigned", words("unsigned_field"), doubt));
   const bool failed = verdict.grade == Grade::fail;
   const std::string pose = registration_text(
       {out->patient_from_tracker(), input->volume ? ct_sha256(*input->volume) : "", utc_now(), out->fit.fre_rms_mm});
@@ -116,10 +119,15 @@ void add_register(CLI::App& app, CommandStatus& status) {
       "--surface", options->files.surface, "refine by this surface: VTK polygons, PLY, STL or OBJ, patient frame, mm");
   CLI::Option* surface_points =
       fiducials.add_option("--surface-points", options->files.surface_points, "points touched on it, tracker frame");
+  CLI::Option* const field =
+      fiducials
+          .add_option("--field", options->files.field,
+                      "correct touched points by this map of the tracker's field (birdseye calibrate field)")
+          ->type_name("MAP");
   fiducials
-      .add_option("--field", options->files.field,
-                  "correct touched points by this map of the tracker's field (birdseye calibrate field)")
-      ->type_name("MAP");
+      .add_flag("--accept-unsigned", options->files.accept_unsigned,
+                "go on also from a map that is not signed, or signed by a machine that is not known here")
+      ->needs(field);
   surface->needs(surface_points);
   surface_points->needs(surface);
   fiducials.add_option("--out", options->out, "patient_from_tracker, a 4x4 matrix")->required();

@@ -68,11 +68,12 @@ void add_result_options(CLI::App& command, ResultPaths& paths, const std::string
       ->check(folder_is_there);
 }
 
-void allow_unsigned_recording(CLI::App& command) {
+void allow_unsigned_sources(CLI::App& command) {
   CLI::Option* const accept = command.get_option("--accept-unsigned");
   accept->remove_needs(command.get_option("--record"));
   accept->description(
-      "go on also from a record or a recording that is not signed, or signed by a machine that is not known here");
+      "go on also from a record, a recording or a map of the field that is not signed, or signed by a machine that is "
+      "not known here");
 }
 
 Result<AdmittedRecording> admit_source(const std::filesystem::path& recording, const ResultPaths& paths) {
@@ -82,9 +83,19 @@ Result<AdmittedRecording> admit_source(const std::filesystem::path& recording, c
   return admit_recording(recording, *authors);
 }
 
-void tell_doubt(const AdmittedRecording& recording, Verdict& verdict) {
-  if (!recording.doubt.empty())
-    verdict.add(Grade::marginal, words("why_unsigned", words("unsigned_recording"), recording.doubt));
+Result<AdmittedField> admit_field(const std::filesystem::path& map, const ResultPaths& paths) {
+  if (map.empty()) return AdmittedField();
+  const auto authors = Authors::of_this_machine(paths.accept_unsigned);
+  if (!authors) return authors.error();
+  return read_field_map(map, *authors);
+}
+
+void tell_doubts(const AdmittedRecording& recording, const AdmittedField& field, Verdict& verdict) {
+  const auto tell = [&verdict](const std::string& what, const std::string& doubt) {
+    if (!doubt.empty()) verdict.add(Grade::marginal, words("why_unsigned", what, doubt));
+  };
+  tell(words("unsigned_recording"), recording.doubt);
+  tell(words("unsigned_field"), field.doubt);
 }
 
 void tell_not_written(const std::filesystem::path& path) {

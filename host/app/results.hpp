@@ -7,6 +7,7 @@
 
 #include "calibration/base/verdict.hpp"
 #include "host/app/commands.hpp"
+#include "host/files/field_files.hpp"
 #include "host/files/record_file.hpp"
 #include "host/recording/recording_signature.hpp"
 #include "host/report/html_page.hpp"
@@ -16,7 +17,7 @@ namespace birdseye::host {
 /// The files that a calibration writes its results to; an empty path is not written.
 struct ResultPaths {
   std::filesystem::path out, json, report, record;
-  bool accept_unsigned = false;  ///< go on from a record or a recording that no known machine signed
+  bool accept_unsigned = false;  ///< go on from a record, a recording or a map that no known machine signed
 };
 
 /// Adds `--out`, `--json`, `--report` and, where the calibration record has an entry for the result, `--record`
@@ -24,13 +25,16 @@ struct ResultPaths {
 /// out_help: what --out holds.
 void add_result_options(CLI::App& command, ResultPaths& paths, const std::string& out_help, bool record = true);
 
-/// For a command that takes a recording: --accept-unsigned is for that too, and needs no --record.
-void allow_unsigned_recording(CLI::App& command);
+/// For a command that takes a recording or a map of the field: --accept-unsigned is for these too, and needs no
+/// --record.
+void allow_unsigned_sources(CLI::App& command);
 
 /// Whose recording a calibration goes by, by the rule for all recordings. Of an empty path, nobody's.
 Result<AdmittedRecording> admit_source(const std::filesystem::path& recording, const ResultPaths& paths);
-/// What the verdict says of it: it passes no more where no known machine signed it.
-void tell_doubt(const AdmittedRecording& recording, Verdict& verdict);
+/// Whose map of the field it corrects poses by, likewise.
+Result<AdmittedField> admit_field(const std::filesystem::path& map, const ResultPaths& paths);
+/// What the verdict says of them: it passes no more where no known machine signed one.
+void tell_doubts(const AdmittedRecording& recording, const AdmittedField& field, Verdict& verdict);
 
 /// Says on stderr that a file is not written for a verdict of fail, and whether one of an earlier run is there, which
 /// somebody may take for this run's. Nothing of an empty path.

@@ -15,6 +15,7 @@
 #include "drivers/system/program.hpp"
 #include "drivers/system/whole_file.hpp"
 #include "host/app/commands.hpp"
+#include "host/files/field_files.hpp"
 #include "host/files/record_file.hpp"
 #include "host/operation/operation.hpp"
 #include "host/recording/recording_signature.hpp"
@@ -53,6 +54,13 @@ Found of_record(const fs::path& path) {
   return {kWhat,        calibration::kRecordFormat,
           read->sha256, read->signature,
           {},           read->of_010 ? "it is of version 0.1, which signed nothing" : ""};
+}
+
+Found of_field_map(const fs::path& path) {
+  constexpr const char* kWhat = "map of the field";
+  const auto read = read_field_map(path);
+  if (!read) return changed(kWhat, read.error());
+  return {kWhat, calibration::kFieldMapFormat, read->sha256, read->signature, {}, ""};
 }
 
 Found of_operation(const fs::path& path) {
@@ -112,16 +120,19 @@ Result<std::vector<Found>> found_at(const fs::path& path) {
     out.push_back(of_session(path.parent_path().empty() ? fs::path(".") : path.parent_path()));
   } else if (begins_as(calibration::kRecordFormat, path)) {
     out.push_back(of_record(path));
+  } else if (begins_as(calibration::kFieldMapFormat, path)) {
+    out.push_back(of_field_map(path));
   } else if (const auto read = read_signed_operation(path); read || begins_as(kOperationFormat, path)) {
     out.push_back(of_operation(path));
   } else if (path.extension() == ".json") {
-    out.push_back(changed("neither record nor operation, or damaged", read.error()));
+    out.push_back(changed("no record, map of the field or operation, or damaged", read.error()));
   }
   if (!out.empty()) return out;
-  return Error{Errc::bad_format,
-               fmt::format("{}: is nothing that Birdseye signs; give a calibration record, a folder of an "
-                           "operation or a session recording, or an appliance recording",
-                           path.string())};
+  return Error{
+      Errc::bad_format,
+      fmt::format("{}: is nothing that Birdseye signs; give a calibration record, a map of the field, a folder of an "
+                  "operation or a session recording, or an appliance recording",
+                  path.string())};
 }
 
 /// Prints what there is to say. True: all is as a known machine signed it.
@@ -160,7 +171,7 @@ Result<ExitCode> run(const VerifyOptions& options) {
     fmt::print("{} {}\nfingerprint {}\n", machine->name(), own.hex(), own.fingerprint());
   }
   if (options.paths.empty() && !options.key)
-    return Error{Errc::bad_value, "verify: name a record, an operation or a recording, or give --key"};
+    return Error{Errc::bad_value, "verify: name a record, a map, an operation or a recording, or give --key"};
   bool good = true;
   for (const fs::path& path : options.paths) {
     const auto found = found_at(path);
@@ -180,10 +191,11 @@ void add_verify(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<VerifyOptions>();
   CLI::App& command =
       *app.add_subcommand("verify",
-                          "says by whom and when records, operations and recordings were signed, and whether "
+                          "says by whom and when records, maps, operations and recordings were signed, and whether "
                           "they are as they were");
   command
-      .add_option("paths", options->paths, "calibration records, folders of operations and recordings, .berec files")
+      .add_option("paths", options->paths,
+                  "calibration records, maps of the field, folders of operations and recordings, .berec files")
       ->type_name("PATH");
   command
       .add_option("--trust", options->trust,

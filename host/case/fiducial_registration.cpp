@@ -205,9 +205,12 @@ Result<void> pair_by_name(const FiducialFiles& files, const std::vector<std::str
 }
 
 Result<void> correct_by_field(const FiducialFiles& files, FiducialInput& input) {
-  const auto field = read_field_map(files.field);
+  const auto authors = Authors::of_this_machine(files.accept_unsigned);
+  if (!authors) return authors.error();
+  const auto field = read_field_map(files.field, *authors);
   if (!field) return field.error();
-  CorrectedPlaces touched = corrected_places(field->map, input.touched_mm);
+  input.field_doubt = field->doubt;
+  CorrectedPlaces touched = corrected_places(*field->map, input.touched_mm);
   if (!touched.unmapped.empty()) {
     return Error{Errc::bad_value,
                  fmt::format("{}: {} of {} points lie where the field was not mapped ({}): take them out, and their "
@@ -215,7 +218,7 @@ Result<void> correct_by_field(const FiducialFiles& files, FiducialInput& input) 
                              files.tracker.string(), touched.unmapped.size(), input.touched_mm.size(),
                              touched.unmapped.front())};
   }
-  CorrectedPlaces surface = corrected_places(field->map, input.surface_points_mm);
+  CorrectedPlaces surface = corrected_places(*field->map, input.surface_points_mm);
   if (!surface.unmapped.empty()) {
     input.notes.push_back(fmt::format("{}: {} of {} points lie where the field was not mapped, and are left out",
                                       files.surface_points.string(), surface.unmapped.size(),

@@ -29,6 +29,7 @@ struct FiducialFiles {
   std::filesystem::path targets, surface, surface_points;  ///< empty: none
   VolumeSource volume;                                     ///< the CT; without a path: none
   std::filesystem::path field;            ///< map that corrects what was touched; empty: it is as measured
+  bool accept_unsigned = false;           ///< also by a map that no known machine signed
   std::optional<double> localisation_mm;  ///< how well a marker is found and touched, rms; none: from the residuals
   bool match = false;                     ///< touched in any order, of markers that may be more
 };
@@ -42,6 +43,7 @@ struct FiducialInput {
   std::vector<std::size_t> ct_of_touch;  ///< empty where the files' order or names hold
   std::vector<std::string> names;        ///< one for each touch where both files name their points; else empty
   std::vector<std::string> notes;        ///< what was done to the points, to be told
+  std::string field_doubt;               ///< of the map that corrected them: why nobody known answers for it; or empty
 };
 
 /// All that was found out.

@@ -235,6 +235,16 @@ Result<calibration::FieldMapFile> read_field_map(const fs::path& path) {
   return map;
 }
 
+Result<AdmittedField> read_field_map(const fs::path& path, const Authors& authors) {
+  if (path.empty()) return AdmittedField();
+  auto read = read_field_map(path);
+  if (!read) return read.error();
+  auto doubt = authors.admit(calibration::kFieldMapFormat, read->sha256, read->signature);
+  if (!doubt)
+    return Error{doubt.error().code, fmt::format("{}: the map of the field {}", path.string(), doubt.error().what)};
+  return AdmittedField{std::move(read->map), *std::move(doubt)};
+}
+
 CorrectedPlaces corrected_places(const calibration::FieldMap& map, std::span<const Eigen::Vector3d> measured_mm) {
   CorrectedPlaces out;
   for (std::size_t i = 0; i < measured_mm.size(); ++i) {

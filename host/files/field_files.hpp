@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "calibration/field/field_fit.hpp"
 #include "calibration/field/field_pairs.hpp"
 #include "calibration/record/field_map_file.hpp"
+#include "host/files/authors.hpp"
 #include "host/files/pose_files.hpp"
 
 namespace birdseye::host {
@@ -51,6 +53,13 @@ Result<FieldPairs> read_field_pairs(const PoseFile& a, const PoseFile& b);
 
 /// Reads a field map that `birdseye calibrate field` wrote; an error names the file.
 Result<calibration::FieldMapFile> read_field_map(const std::filesystem::path& path);
+
+struct AdmittedField {
+  std::optional<calibration::FieldMap> map;
+  std::string doubt;  ///< empty where the author is known, as of Authors::admit()
+};
+/// The same as far as Authors::admit() lets it pass. Of an empty path, no map.
+Result<AdmittedField> read_field_map(const std::filesystem::path& path, const Authors& authors);
 
 /// Places in the tracker's frame as a map corrects them, in their order, and why others could not be: "point 3: at ..".
 struct CorrectedPlaces {

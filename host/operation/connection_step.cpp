@@ -13,6 +13,7 @@ void ConnectionStep::set_link(bool connected, const std::string& words, bool vid
   if (!connected) {
     link_.health.reset();
     link_.appliance_says.clear();
+    link_.appliance_notes.clear();
   }
   const auto& health = link_.health;
   note_.done = connected && (health ? health->state == "ready" : video && link_.appliance_says.empty());

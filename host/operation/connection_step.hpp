@@ -13,7 +13,10 @@ namespace birdseye::host {
 class ConnectionStep {
  public:
   void take(const wire::Health& health) { link_.health = health; }
-  void take(const wire::Status& status) { link_.appliance_says = status.ok ? "" : status.text; }
+  void take(const wire::Status& status) {
+    link_.appliance_says = status.ok ? "" : status.text;
+    link_.appliance_notes = status.ok ? status.text : "";
+  }
   /// The link came or went. video: a frame has come. may_retry: nobody tries any more, but a person may have it tried
   /// again.
   void set_link(bool connected, const std::string& words, bool video, bool may_retry = false);

@@ -12,9 +12,10 @@ namespace birdseye::host {
 /// What is connected.
 struct LinkState {
   bool connected = false;
-  bool may_retry = false;  ///< it was given up, and can be tried again
-  std::string words;       ///< to what, or why not
-  std::string appliance_says;
+  bool may_retry = false;       ///< it was given up, and can be tried again
+  std::string words;            ///< to what, or why not
+  std::string appliance_says;   ///< what is amiss, as the appliance has it
+  std::string appliance_notes;  ///< what it says where nothing is: a plain wire, a map that nobody known signed
   std::optional<wire::Health> health;
 };
 

@@ -355,6 +355,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"unsigned_record", "calibration record"},
     {"unsigned_operation", "operation"},
     {"unsigned_recording", "recording"},
+    {"unsigned_field", "map of the field"},
     {"note_kept_unknown", "what was kept does not say how far hand-eye is off: calibrate anew"},
     {"note_appliance_is", "the appliance is {}"},
     {"note_nothing_touched", "nothing was touched: the pointer was not seen, or moved faster than a stroke"},

@@ -20,7 +20,8 @@ void draw_connect(PanelContext& context) {
   const Theme& theme = context.theme;
   const LinkState& link = context.operation.link;
   say(link.connected ? theme.good : theme.warn, link.words);
-  if (!link.appliance_says.empty()) say(theme.warn, link.appliance_says);
+  for (const std::string& words : {link.appliance_says, link.appliance_notes})
+    if (!words.empty()) say(theme.warn, words);
   if (link.may_retry) say(theme.warn, words("retry"));
   if (!link.health) return;
   for (const wire::InstrumentHealth& one : link.health->instruments) {

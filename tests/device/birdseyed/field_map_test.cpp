@@ -9,6 +9,7 @@
 #include "device/birdseyed/core.hpp"
 #include "device/birdseyed/recording.hpp"
 #include "device/wire/igtl_bytes.hpp"
+#include "drivers/identity/this_machine.hpp"
 #include "tests/support/core_session.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -129,9 +130,7 @@ TEST(CoreWithAFieldMap, OutsideTheMapPosesAreDoubtedInWords) {
   EXPECT_GT(refused, 10);
 }
 
-TEST(CoreWithAFieldMap, ReplaysToTheSameBytes) {
-  const auto events = session(4, 4);
-  const CoreSettings settings = with(map(450));
+void replays_to_the_same_bytes(const CoreSettings& settings, const std::vector<RawEvent>& events) {
   const birdseye::testing::Scratch scratch;
   Bytes bytes = recording_magic();
   const auto put = [&bytes](const Bytes& more) { bytes.insert(bytes.end(), more.begin(), more.end()); };
@@ -149,6 +148,24 @@ TEST(CoreWithAFieldMap, ReplaysToTheSameBytes) {
     ASSERT_EQ(a.size(), b.size());
     for (std::size_t i = 0; i < a.size(); ++i) ASSERT_EQ(a[i].bytes(), b[i].bytes());
   }
+}
+
+TEST(CoreWithAFieldMap, AMapOfNobodyKnownLetsNoPoseThrough) {
+  CoreSettings settings = with(map());
+  settings.field_refused = "field.json: the map of the field is not signed";
+  Core core(settings);
+  const auto said = told(core, session(4, 1));
+  for (const auto& birds : only<wire::Birds>(said)) EXPECT_TRUE(birds.birds.empty());
+  for (const auto& frame : only<wire::VideoFrame>(said)) EXPECT_FALSE(frame.info.pose.tracker_from_sensor);
+  EXPECT_NE(core.status_text().find(settings.field_refused), std::string::npos) << core.status_text();
+}
+
+TEST(CoreWithAFieldMap, ReplaysToTheSameBytes) {
+  const auto events = session(4, 4);
+  CoreSettings settings = with(map(450));
+  replays_to_the_same_bytes(settings, events);
+  settings.field_refused = "field.json: the map of the field is not signed";
+  replays_to_the_same_bytes(settings, events);
 }
 
 TEST(CoreWithAFieldMap, ARecordingWhoseMapIsNoneIsRefused) {
@@ -190,6 +207,38 @@ TEST(ConfigOfAFieldMap, IsReadExactly) {
   ASSERT_TRUE(config->core.field);
   for (const double x : {100.1, 300.7, 699.3})
     EXPECT_EQ(*config->core.field->correction_mm({x, 1.0 / 3, 7}), *map().correction_mm({x, 1.0 / 3, 7}));
+}
+
+TEST(ConfigOfAFieldMap, OfNobodyKnownIsNotUsedUnlessAskedTo) {
+  const calibration::FieldMapNotes notes{"2026-11-22T09:30:00Z", "birdseye", "180 places", Grade::pass, 0.4};
+  const auto signed_by = [&notes](const ThisMachine& machine) {
+    return calibration::field_map_text(
+        map(), notes, machine.sign(calibration::kFieldMapFormat, calibration::signed_sha256(map(), notes)));
+  };
+  const birdseye::testing::Scratch scratch;
+  const auto refusal = [&](const std::string& text, const std::string& more = "") {
+    const auto config = read_config(scratch.file("c.toml", config_with(scratch.file("field.json", text)) + more));
+    return config ? config->core.field_refused : config.error().what;
+  };
+  const auto own = ThisMachine::open();
+  ASSERT_TRUE(own) << own.error().what;
+  const ThisMachine other = ThisMachine::for_once();
+  const std::string unsigned_map = calibration::field_map_text(map(), notes);
+  EXPECT_EQ(refusal(signed_by(*own)), "");
+  EXPECT_NE(refusal(unsigned_map).find("field.json: the map of the field is not signed"), std::string::npos);
+  EXPECT_NE(refusal(unsigned_map).find("accept_unsigned = true"), std::string::npos);
+  EXPECT_NE(refusal(signed_by(other)).find("add the line \"NAME " + other.key().public_key().hex()), std::string::npos);
+  for (const std::string& text : {unsigned_map, signed_by(other), signed_by(*own)}) {
+    const auto used =
+        read_config(scratch.file("c.toml", config_with(scratch.file("field.json", text)) + "accept_unsigned = true\n"));
+    ASSERT_TRUE(used) << used.error().what;
+    EXPECT_EQ(used->core.field_refused, "");
+    EXPECT_EQ(used->core.notice.starts_with("UNSIGNED: "), text != signed_by(*own)) << used->core.notice;
+  }
+  const auto copied = own->sign(calibration::kFieldMapFormat, std::string(64, '0'));
+  EXPECT_NE(
+      refusal(calibration::field_map_text(map(), notes, copied), "accept_unsigned = true\n").find("was changed since"),
+      std::string::npos);
 }
 
 TEST(ConfigOfAFieldMap, AFileThatIsMissingOrDamagedIsAFaultWithItsLine) {

@@ -220,6 +220,32 @@ TEST_F(MappedByCommand, APointersTipIsFoundByCorrectedPoses) {
                  {"no.json"});
 }
 
+TEST_F(MappedByCommand, AMapOfNobodyKnownIsUsedOnlyWhenAskedTo) {
+  calibration::SimulatedPointer pointer;
+  std::string poses = "x,y,z,qx,qy,qz,qw\n";
+  for (const auto& pose : pointer.poses(60)) poses += pose_row(bent(pose.tracker_from_sensor)) + "\n";
+  const std::string tip = "calibrate tip --poses " + scratch.file("p.csv", poses) + " --field ";
+  const std::string fiducials = "register fiducials --out " + (scratch / "p.txt").string() + " --ct " +
+                                scratch.file("ct.txt", "0 0 0\n100 0 0\n0 80 0\n0 0 60\n") + " --tracker " +
+                                scratch.file("touched.txt", "300 0 0\n400 0 0\n300 80 0\n300 0 60\n") + " --field ";
+  const auto own = calibration::parse_field_map(testing::contents_of(map));
+  ASSERT_TRUE(own && own->signature);
+  const std::string nobodys = scratch.file("nobodys.json", calibration::field_map_text(own->map, own->notes));
+  auto notes = own->notes;
+  notes.held_out_mm /= 2;
+  const std::string changed =
+      scratch.file("changed.json", calibration::field_map_text(own->map, notes, own->signature));
+  for (const std::string& command : {tip, fiducials}) {
+    expect_refused("birdseye", command + nobodys, {"nobodys.json: the map of the field is not signed"});
+    const auto used = run("birdseye", command + nobodys + " --accept-unsigned");
+    EXPECT_NE(used.code, 2) << used.output;
+    EXPECT_NE(used.output.find("UNSIGNED: the map of the field is not signed"), std::string::npos) << used.output;
+    EXPECT_EQ(used.output.find("verdict: pass"), std::string::npos) << used.output;
+    expect_refused("birdseye", command + changed + " --accept-unsigned", {"changed.json: ", "was changed since"});
+    EXPECT_EQ(run("birdseye", command + map).output.find("UNSIGNED"), std::string::npos);
+  }
+}
+
 TEST_F(MappedByCommand, TouchedFiducialsAreCorrectedAndThoseBeyondTheMapRefused) {
   const std::vector<Eigen::Vector3d> markers{{200, -150, -90}, {500, -120, 60},  {350, 140, -40},
                                              {250, 90, 120},   {560, 160, -110}, {420, -10, 20}};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "calibration/record/field_map_file.hpp"
 #include "device/birdseyed/recorder.hpp"
 #include "host/operation/operation.hpp"
 #include "host/recording/recording_writer.hpp"
@@ -45,7 +46,17 @@ TEST(VerifyCommand, SaysByWhomAndWhenEachKindWasSigned) {
   ASSERT_TRUE(host::write_operation(scratch / "operation", operation, *authors().machine));
   record_session(scratch / "session");
   const std::string by = "signed by " + machine_name() + " (" + authors().machine->key().public_key().fingerprint();
+  calibration::FieldMapData field;
+  field.functions.low_mm = {100, -300, -100};
+  field.functions.high_mm = {700, 300, 200};
+  field.position_mm.assign(4, Eigen::Vector3d(1, 2, 3));
+  field.sigma_mm.assign(9 * 9 * 9, 0.7);
+  const auto map = calibration::FieldMap::from(std::move(field));
+  const calibration::FieldMapNotes notes{"2026-11-22T09:30:00Z", "birdseye", "180 places", Grade::pass, 0.4};
+  const auto signature = authors().machine->sign(calibration::kFieldMapFormat, signed_sha256(*map, notes));
+  (void)scratch.file("field.json", calibration::field_map_text(*map, notes, signature));
   for (const auto& [name, what] : {std::pair{"record.json", ": calibration record: "},
+                                   {"field.json", ": map of the field: "},
                                    {"operation", ": operation: "},
                                    {"session", ": session recording: "}}) {
     expect((scratch / name).string(), 0, {std::string(name) + what + by, "and as it was signed"});
@@ -68,6 +79,8 @@ TEST(VerifyCommand, SaysWhatWasChanged) {
   std::string text = testing::signed_record_text(record());
   text.replace(text.find("640"), 3, "641");
   expect(scratch.file("record.json", text), 3, {"calibration record: ", "checksum does not fit"});
+  expect(scratch.file("field.json", R"({"format": "birdseye field map", "version": 1})"), 3,
+         {"map of the field: ", "not a whole one"});
   record_session(scratch / "session");
   (void)scratch.file("session/events.jsonl", "{}\n");
   (void)scratch.file("session/more.txt", "");
@@ -84,7 +97,7 @@ TEST(VerifyCommand, SaysWhatWasChanged) {
 TEST(VerifyCommand, SaysWhatNobodySigned) {
   const Scratch scratch;
   expect(scratch.file("other.json", R"({"format": {"name": "x"}})"), 3,
-         {": neither record nor operation, or damaged: "});
+         {": no record, map of the field or operation, or damaged: "});
   expect(scratch.file("record.json", calibration::record_text(record())), 3, {"not signed: nobody says who wrote it"});
   record_session(scratch / "session");
   (void)scratch.file("session/recording.json", R"({"birdseye_recording": 1, "ended": false})");

@@ -41,6 +41,20 @@ TEST(ConnectionStep, IsDoneWhileTheApplianceIsReady) {
   EXPECT_FALSE(step.link().health.has_value());
 }
 
+TEST(ConnectionStep, WhatTheApplianceNotesWhereNothingIsAmissIsKeptAndStopsNothing) {
+  ConnectionStep step;
+  step.take(wire::Status{false, "no tracker; UNSIGNED: a map"});
+  EXPECT_EQ(step.link().appliance_says, "no tracker; UNSIGNED: a map");
+  EXPECT_EQ(step.link().appliance_notes, "");
+  step.take(wire::Status{true, "UNSIGNED: a map"});
+  step.set_link(true, "connected", true);
+  EXPECT_TRUE(step.note().done);
+  EXPECT_EQ(step.link().appliance_says, "");
+  EXPECT_EQ(step.link().appliance_notes, "UNSIGNED: a map");
+  step.set_link(false, "gone", false);
+  EXPECT_EQ(step.link().appliance_notes, "");
+}
+
 /// As a window kept it, made at 9:35.
 CalibratedScope kept_scope() {
   calibration::HandEyeResult found;
