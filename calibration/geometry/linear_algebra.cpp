@@ -50,6 +50,20 @@ Eigen::MatrixXd inverse_information(const Eigen::MatrixXd& information) {
          unit.asDiagonal();
 }
 
+bool is_covariance(const Eigen::MatrixXd& matrix) {
+  constexpr double kLargest = 1e12, kRounded = 1e-9;
+  if (!matrix.allFinite() || matrix.cwiseAbs().maxCoeff() >= kLargest || matrix.diagonal().minCoeff() < 0 ||
+      !matrix.isApprox(matrix.transpose(), 1e-6))
+    return false;
+  // The axes differ by their units, so each is measured by its own sigma.
+  const Eigen::VectorXd sigma = matrix.diagonal().cwiseSqrt();
+  const Eigen::VectorXd inverse = sigma.unaryExpr([](double one) { return one > 0 ? 1 / one : 0; });
+  const Eigen::VectorXd held = (sigma.array() == 0).cast<double>();
+  if (!(held.asDiagonal() * matrix).isZero(0)) return false;
+  const Eigen::MatrixXd correlation = inverse.asDiagonal() * matrix * inverse.asDiagonal();
+  return symmetric_eigen(correlation).values.minCoeff() >= -kRounded;
+}
+
 Matrix6d whitening(const Matrix6d& covariance) {
   return Matrix6d(covariance.llt().matrixL()).triangularView<Eigen::Lower>().solve(Matrix6Xd(Matrix6d::Identity()));
 }

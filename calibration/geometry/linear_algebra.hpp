@@ -38,6 +38,10 @@ Eigen::MatrixXd inverse_symmetric(const Eigen::MatrixXd& matrix);
 /// brought to one scale before they are inverted.
 Eigen::MatrixXd inverse_information(const Eigen::MatrixXd& information);
 
+/// Whether measurements can have such a covariance: finite, symmetric, and without a variance below zero along any
+/// direction. What has no variance, as a parameter that was held, goes with nothing either.
+bool is_covariance(const Eigen::MatrixXd& matrix);
+
 /// W with W^T W = covariance^-1: brings what has this covariance to one of unit variances.
 Matrix6d whitening(const Matrix6d& covariance);
 

@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "calibration/base/nesting.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/record/checksum.hpp"
 #include "calibration/record/round_field_json.hpp"
 #include "calibration/record/sha256.hpp"
@@ -46,9 +48,17 @@ Matrix matrix_of(const Json& rows) {
 template <typename Matrix>
 Matrix covariance_of(const Json& rows) {
   Matrix matrix = matrix_of<Matrix>(rows);
-  if (!matrix.isApprox(matrix.transpose(), 1e-6) || matrix.diagonal().minCoeff() < 0)
-    throw std::range_error("a covariance that is none");
+  if (!is_covariance(matrix)) throw std::range_error("a covariance that is none");
   return matrix;
+}
+
+constexpr double kLargestFigure = 1e4;  // mm, px, ms and ppm alike: beyond it nothing is calibrated
+
+/// An error that was measured, so none below zero.
+void read_error_figure(const Json& json, const char* name, double& figure) {
+  json.at(name).get_to(figure);
+  if (!(figure >= 0 && figure <= kLargestFigure))
+    throw std::range_error(fmt::format("{} is {:g}, which no measurement gives", name, figure));
 }
 
 Json json_of(const Provenance& p) {
@@ -95,8 +105,8 @@ LensEntry lens_of(const Json& json) {
   for (const auto& [name, field] : kParameters) json.at(name).get_to(lens.camera.*field);
   if (const auto sound = check(lens.camera); !sound) throw std::range_error(sound.error().what);
   lens.covariance = covariance_of<decltype(lens.covariance)>(json.at("covariance"));
-  json.at("rms_px").get_to(lens.rms_px);
-  json.at("held_out_px").get_to(lens.held_out_px);
+  read_error_figure(json, "rms_px", lens.rms_px);
+  read_error_figure(json, "held_out_px", lens.held_out_px);
   if (json.contains("rod_angle_deg")) lens.rod_angle_deg = json.at("rod_angle_deg").get<double>();
   if (json.contains("round_field")) lens.round_field = round_field_of_json(json.at("round_field"));
   return lens;
@@ -148,9 +158,9 @@ HandEyeEntry hand_eye_of(const Json& json) {
     throw std::range_error("a camera_from_sensor that is no rigid transform");
   hand_eye.camera_from_sensor = Transform<Camera, Sensor>::from_matrix(matrix);
   hand_eye.covariance = covariance_of<decltype(hand_eye.covariance)>(json.at("covariance"));
-  json.at("rms_px").get_to(hand_eye.rms_px);
-  json.at("held_out_px").get_to(hand_eye.held_out_px);
-  json.at("held_out_mm").get_to(hand_eye.held_out_mm);
+  read_error_figure(json, "rms_px", hand_eye.rms_px);
+  read_error_figure(json, "held_out_px", hand_eye.held_out_px);
+  read_error_figure(json, "held_out_mm", hand_eye.held_out_mm);
   if (json.contains("rod")) hand_eye.rod = rod_of(json.at("rod"));
   if (json.contains("independent_stations")) {
     hand_eye.independent_stations = json.at("independent_stations").get<int>();
@@ -171,7 +181,7 @@ TipEntry tip_of(const Json& json) {
   tip.provenance = provenance_of(json);
   tip.tip_in_sensor_mm = vector_of(json.at("tip_in_sensor_mm"));
   tip.covariance_mm2 = covariance_of<Eigen::Matrix3d>(json.at("covariance_mm2"));
-  json.at("rms_mm").get_to(tip.rms_mm);
+  read_error_figure(json, "rms_mm", tip.rms_mm);
   return tip;
 }
 
@@ -188,6 +198,9 @@ LatencyEntry latency_of(const Json& json) {
   json.at("offset_ms").get_to(latency.offset_ms);
   std::tie(latency.ci95_low_ms, latency.ci95_high_ms) = json.at("offset_ci95_ms").get<std::pair<double, double>>();
   json.at("drift_ppm").get_to(latency.drift_ppm);
+  if (!(latency.ci95_low_ms <= latency.ci95_high_ms) || std::abs(latency.drift_ppm) > kLargestFigure ||
+      std::max({std::abs(latency.offset_ms), -latency.ci95_low_ms, latency.ci95_high_ms}) > kLargestFigure)
+    throw std::range_error("a latency that no measurement gives");
   return latency;
 }
 

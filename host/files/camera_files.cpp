@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "calibration/base/nesting.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 #include "drivers/system/whole_file.hpp"
 #include "host/confine/confined_result.hpp"
 #include "host/files/camera_text.hpp"
@@ -171,9 +172,7 @@ Result<std::optional<CameraMatrix>> read_camera_covariance(const fs::path& path)
   if (!stored) return stored.error().with_context(path.string());
   if (stored->count == 0) return std::optional<CameraMatrix>();
   const CameraMatrix out(stored->by_rows.data());  // as its transpose, where it is none
-  const bool sound = out.allFinite() && out.diagonal().minCoeff() >= 0 &&
-                     (out - out.transpose()).cwiseAbs().maxCoeff() <= 1e-6 * out.diagonal().maxCoeff();
-  if (!sound)
+  if (!is_covariance(out))
     return Error{Errc::bad_value,
                  fmt::format("{}: camera_covariance is no covariance; take it out to work without", path.string())};
   return std::optional(out);

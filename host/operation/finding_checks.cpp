@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
+#include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/geometry/rigid_matrix.hpp"
 
 namespace birdseye::host {
@@ -20,22 +20,7 @@ Result<void> check_figure(const char* name, const std::optional<double>& figure)
 
 template <typename Matrix>
 Result<void> check_covariance(const char* name, const std::optional<Matrix>& covariance) {
-  constexpr double kLargest = 1e12, kRounded = 1e-9;
-  if (!covariance) return {};
-  const bool finite = covariance->allFinite() && covariance->cwiseAbs().maxCoeff() < kLargest;
-  const bool symmetric = finite && covariance->isApprox(covariance->transpose(), 1e-6);
-  if (symmetric) {
-    // The covariance's axes differ by their units, so each is measured by its own sigma.
-    const auto scale = covariance->diagonal().cwiseMax(0).cwiseSqrt().eval();
-    const auto inverse = scale.unaryExpr([](double sigma) { return sigma > 0 ? 1 / sigma : 0; }).eval();
-    const Matrix correlation = inverse.asDiagonal() * *covariance * inverse.asDiagonal();
-    // What has no variance, as a parameter that was held, goes with nothing either.
-    const auto held = (scale.array() == 0).template cast<double>().matrix().eval();
-    const bool alone = (held.asDiagonal() * *covariance).isZero(0);
-    const bool positive = covariance->diagonal().minCoeff() >= 0 && alone &&
-                          Eigen::SelfAdjointEigenSolver<Matrix>(correlation).eigenvalues().minCoeff() >= -kRounded;
-    if (positive) return {};
-  }
+  if (!covariance || is_covariance(*covariance)) return {};
   return Error{Errc::bad_value, fmt::format("{} is no covariance", name)};
 }
 

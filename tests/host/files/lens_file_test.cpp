@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "host/files/camera_files.hpp"
 #include "tests/support/lens.hpp"
 #include "tests/support/scratch.hpp"
@@ -26,10 +28,14 @@ TEST(LensFile, HoldsHowWellTheLensIsKnown) {
   const auto none = read_camera_covariance(scratch.file("other.yaml", lens));
   ASSERT_TRUE(none);
   EXPECT_FALSE(*none);
-  covariance(2, 2) = -1;
-  const auto wrong = read_camera_covariance(scratch.file("wrong.yaml", lens + camera_covariance_text(covariance)));
-  ASSERT_FALSE(wrong);
-  EXPECT_NE(wrong.error().what.find("is no covariance"), std::string::npos) << wrong.error().what;
+  CameraMatrix negative = covariance, beyond_one = covariance;
+  negative(2, 2) = -1;
+  beyond_one(0, 1) = beyond_one(1, 0) = 1.1 * std::sqrt(covariance(0, 0) * covariance(1, 1));
+  for (const CameraMatrix& none_of_these : {negative, beyond_one}) {
+    const auto wrong = read_camera_covariance(scratch.file("wrong.yaml", lens + camera_covariance_text(none_of_these)));
+    ASSERT_FALSE(wrong);
+    EXPECT_NE(wrong.error().what.find("is no covariance"), std::string::npos) << wrong.error().what;
+  }
   const auto small = read_camera_covariance(scratch.file(
       "small.yaml",
       lens + "camera_covariance: !!opencv-matrix\n   rows: 1\n   cols: 2\n   dt: d\n   data: [ 1., 2. ]\n"));
