@@ -45,9 +45,10 @@ struct LabelPixels {
   }
 };
 
+constexpr int kHighestSegment = 65535;
+
 /// The segments that the file has; empty, or what is wrong. by_pixels: one may be the background, as 0.
 std::string read_names(DcmDataset& dataset, bool by_pixels, std::vector<NamedLabel>& names) {
-  constexpr int kHighestSegment = 65535;
   std::set<int> numbers;
   for (DcmItem* segment : items_of(dataset, DCM_SegmentSequence)) {
     const auto number = integer_of(*segment, DCM_SegmentNumber);
@@ -243,6 +244,8 @@ std::string lay_frames(const std::vector<LabelFrame>& frames, const std::vector<
   for (const LabelFrame& frame : frames) highest = std::max(highest, frame.segment);
   if (highest > kHighestLabel) return "numbers its segments too high; export it again";
   SharedValues values(highest);
+  std::vector<char> is_segment(kHighestSegment + 1, 0);
+  for (const NamedLabel& label : out.names) is_segment[static_cast<std::size_t>(label.number)] = 1;
   const std::size_t plane = pixels.per_frame();
   out.labels.assign(plane * static_cast<std::size_t>(out.size[2]), 0);
   for (std::size_t f = 0; f < frames.size(); ++f) {
@@ -250,6 +253,10 @@ std::string lay_frames(const std::vector<LabelFrame>& frames, const std::vector<
     for (std::size_t i = 0; i < plane; ++i) {
       const int pixel = pixels.at(f * plane + i);
       if (pixel < pixels.at_least) continue;
+      if (frames[f].segment == 0 && is_segment[static_cast<std::size_t>(pixel)] == 0) {
+        return fmt::format("has a voxel of segment {}, which is none of its segments (0062,0002); export it again",
+                           pixel);
+      }
       const auto value = values.with(slice[i], frames[f].segment == 0 ? pixel : frames[f].segment);
       if (!value || *value > kHighestLabel) return "has too many segments that share voxels; export fewer of them";
       slice[i] = static_cast<std::int16_t>(*value);

@@ -79,6 +79,16 @@ TEST(DicomSegFrames, OfALabelMapTheBackgroundMayBeASegment) {
   expect_said(said_of(seg, second_segment("-1")), "has a segment of the number '-1'");
 }
 
+TEST(DicomSegFrames, OfALabelMapEachVoxelIsOfASegmentThatTheFileHas) {
+  Segmentation map = stack_of({0, 2});
+  map.type = "LABELMAP";
+  for (auto& frame : map.frames) frame.segment = 0;
+  map.frames[1].pixels[7] = 2;
+  EXPECT_EQ(said_of(map), "");
+  map.frames[1].pixels[7] = 3;
+  expect_said(said_of(map), "has a voxel of segment 3, which is none of its segments (0062,0002)");
+}
+
 /// Says of the first frame, in its groups or in those of all frames, which segment it is of.
 testing::Elements frames_are_of(const std::string& segment, const DcmTagKey& groups) {
   return [segment, groups](DcmDataset& dataset) {
