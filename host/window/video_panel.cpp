@@ -22,7 +22,8 @@ constexpr ImU32 kGround = IM_COL32(0, 0, 0, 235);
 constexpr float kBannerPx = 28;
 
 /// The safety of the picture, in words, sign and colour, over its upper edge.
-void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
+/// Gives how high it is: no word of a reason is cut, however long the reason or narrow the picture.
+float draw_banner(const PanelContext& context, ImVec2 from, float wide) {
   const float scale = context.at.scale;
   const Banner banner = banner_of(context.operation, context.shown, context.facts);
   std::string text = banner.text;
@@ -31,10 +32,13 @@ void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
   const ImU32 ground = ImGui::GetColorU32(colour(theme.background));
   const ImU32 ink = ImGui::GetColorU32(colour(banner.grade ? colour_of(*banner.grade, theme) : theme.text));
   ImDrawList* const list = ImGui::GetWindowDrawList();
-  const float high = kBannerPx * scale;
+  const float left = 14 * scale, above = 5 * scale, text_wide = std::max(wide - 2 * left, 1.0F);
+  const ImVec2 text_size = ImGui::CalcTextSize(text.c_str(), nullptr, false, text_wide);
+  const float high = std::max(kBannerPx * scale, text_size.y + 2 * above);
   list->AddRectFilled(from, ImVec2(from.x + wide, from.y + high), ground);
   list->AddRectFilled(from, ImVec2(from.x + 6 * scale, from.y + high), ink);
-  list->AddText(ImVec2(from.x + 14 * scale, from.y + 5 * scale), ink, text.c_str());
+  list->AddText(nullptr, 0, ImVec2(from.x + left, from.y + above), ink, text.c_str(), nullptr, text_wide);
+  return high;
 }
 
 /// Where the target is drawn, and how far from there it may be. checked: by a landmark. Gives what that takes of the
@@ -139,12 +143,12 @@ void draw_picture(PanelContext& context, ImVec2 from, ImVec2 size) {
     if (context.operation.target && shown.overlaid)
       target = draw_target(*context.operation.target, context.operation.checked.has_value(), corner, fit, scale);
   }
-  draw_banner(context, from, size.x);
+  const float banner_high = draw_banner(context, from, size.x);
   const ImVec2 lower_left(from.x + gap, from.y + size.y - gap);
   const float margins_high = draw_margin_legend(context, lower_left);
   const float legend_high =
       margins_high + draw_vessel_legend(context, ImVec2(lower_left.x, lower_left.y - margins_high));
-  const ScreenBox area{{from.x + gap, from.y + kBannerPx * scale + gap},
+  const ScreenBox area{{from.x + gap, from.y + banner_high + gap},
                        {from.x + size.x - gap, from.y + size.y - gap - legend_high}};
   draw_inset(context, area, target);
 }
