@@ -30,8 +30,9 @@ struct LabelFrame {
 /// How the pixels of all frames are to be taken.
 struct LabelPixels {
   int columns = 0, rows = 0;
-  int bits = 8;      ///< of a pixel: 1, 8 or 16
-  int at_least = 1;  ///< for the pixel to belong to the frame's segment
+  int bits = 8;                   ///< of a pixel: 1, 8 or 16
+  int at_least = 1;               ///< for the pixel to belong to the frame's segment
+  std::optional<int> background;  ///< of a label map, where the file says which number it has
   std::vector<std::uint8_t> bytes;
 
   [[nodiscard]] std::size_t per_frame() const {
@@ -254,6 +255,7 @@ std::string lay_frames(const std::vector<LabelFrame>& frames, const std::vector<
       const int pixel = pixels.at(f * plane + i);
       if (pixel < pixels.at_least) continue;
       if (frames[f].segment == 0 && is_segment[static_cast<std::size_t>(pixel)] == 0) {
+        if (pixel == pixels.background) continue;
         return fmt::format("has a voxel of segment {}, which is none of its segments (0062,0002); export it again",
                            pixel);
       }
@@ -296,6 +298,7 @@ Result<DicomLabels> read_dicom_labels(const fs::path& path) {
     return refused(Errc::unsupported, path, "has more voxels than any CT; export it on the grid of the CT");
   if (type == "FRACTIONAL")
     pixels.at_least = std::max(1, (integer_of(dataset, DCM_MaximumFractionalValue).value_or(255) + 1) / 2);
+  if (by_pixels) pixels.background = integer_of(dataset, DCM_PixelPaddingValue);
   wrong = lay_frames(frames, slice_of, pixels, out);
   if (!wrong.empty()) return refused(Errc::bad_format, path, wrong);
   return out;

@@ -87,6 +87,10 @@ TEST(DicomSegFrames, OfALabelMapEachVoxelIsOfASegmentThatTheFileHas) {
   EXPECT_EQ(said_of(map), "");
   map.frames[1].pixels[7] = 3;
   expect_said(said_of(map), "has a voxel of segment 3, which is none of its segments (0062,0002)");
+  EXPECT_EQ(said_of(map, [](DcmDataset& dataset) { put(dataset, DCM_PixelPaddingValue, 3); }), "")
+      << "the background has the number that the file says";
+  expect_said(said_of(map, [](DcmDataset& dataset) { put(dataset, DCM_PixelPaddingValue, 255); }),
+              "has a voxel of segment 3");
 }
 
 /// Says of the first frame, in its groups or in those of all frames, which segment it is of.
