@@ -62,7 +62,11 @@ Result<std::string> record_with(const std::filesystem::path& path, const RecordE
     record = std::move(read->record);
   }
   entry.enter(record, {utc_now(), "birdseye " BIRDSEYE_VERSION, entry.made_from, grade});
-  return record_text(record, *authors.machine);
+  std::string text = record_text(record, *authors.machine);
+  // What no reader takes would be written over a record that is sound.
+  if (const auto sound = calibration::parse_record(text); !sound)
+    return sound.error().with_context(fmt::format("{} is left as it was, for with this entry", path.string()));
+  return text;
 }
 
 void enter_lens(calibration::CalibrationRecord& record, calibration::LensEntry entry) {

@@ -131,8 +131,8 @@ TEST(CalibrationRecord, NumbersThatMakeNoSenseAreRefusedWhateverTheirChecksum) {
   refused([](auto& r) { r.hand_eye->covariance(0, 1) = r.hand_eye->covariance(1, 0) = 5; }, "covariance");
   refused([](auto& r) { r.hand_eye->held_out_mm = -1; }, "held_out_mm is -1");
   refused([](auto& r) { r.lens->rms_px = 1e300; }, "rms_px is 1e+300");
-  refused([](auto& r) { std::swap(r.latency->ci95_low_ms, r.latency->ci95_high_ms); }, "latency");
-  refused([](auto& r) { r.latency->drift_ppm = 1e9; }, "latency");
+  refused([](auto& r) { std::swap(r.latency->ci95_low_ms, r.latency->ci95_high_ms); }, "offset_ci95_ms");
+  refused([](auto& r) { r.latency->offset_ms = -2e4; }, "offset_ms");
   refused([](auto& r) { r.hand_eye->rod->axis_in_sensor *= 2; }, "unit length");
   refused([](auto& r) { r.hand_eye->independent_stations = 0; }, "no stations");
   refused([](auto& r) { r.tip->provenance.grade = Grade::fail; }, "fail");

@@ -93,6 +93,19 @@ TEST(SignedRecord, AnEntryIsNotMadeIntoARecordOfAnUnknownMachine) {
   EXPECT_EQ(read->record.scope, "no. 18");
 }
 
+TEST(SignedRecord, AnEntryThatNoReaderWouldTakeIsNotMade) {
+  const testing::Scratch scratch;
+  const Authors own = Authors::for_once();
+  const std::string path = scratch.file("record.json", record_text(small_record(), *own.machine));
+  const RecordEntry entry{"a test", [](auto& record, const auto& provenance) {
+                            record.tip = calibration::TipEntry{provenance, {1, 2, 3}, Eigen::Matrix3d::Zero(), -1};
+                          }};
+  const auto refused = record_with(path, entry, Grade::pass, own);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().what.find("record.json is left as it was, for with this entry"), std::string::npos);
+  EXPECT_NE(refused.error().what.find("rms_mm is -1"), std::string::npos) << refused.error().what;
+}
+
 TEST(FileSignature, HasFourPartsAndNoMore) {
   nlohmann::json json = calibration::json_of_signature({"machine", "key", "utc", "signature"});
   EXPECT_EQ(calibration::signature_of_json(json).machine, "machine");
