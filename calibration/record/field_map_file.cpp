@@ -16,6 +16,7 @@ namespace birdseye::calibration {
 namespace {
 
 constexpr int kVersion = 1;
+constexpr double kLargestError_mm = 1e4;
 
 std::optional<Grade> grade_of(const std::string& name) {
   for (const Grade grade : {Grade::pass, Grade::marginal}) {
@@ -34,6 +35,8 @@ Result<FieldMapFile> map_of(const nlohmann::json& json) {
   json.at("software").get_to(notes.software);
   json.at("made_from").get_to(notes.made_from);
   json.at("held_out_mm").get_to(notes.held_out_mm);
+  if (!(notes.held_out_mm >= 0 && notes.held_out_mm <= kLargestError_mm))
+    return no_map(fmt::format("for its held_out_mm is {:g}, which no measurement gives", notes.held_out_mm));
   if (json.contains("tracker")) json.at("tracker").get_to(notes.tracker);
   const auto grade = grade_of(json.at("verdict").get<std::string>());
   if (!grade) return no_map("or one whose verdict was fail");
@@ -101,6 +104,7 @@ Result<FieldMapFile> parse_field_map(const std::string& text) {
     if (!out) return out.error();
     out->sha256 = sha256_of(json.dump());
     out->signature = std::move(signature);
+    out->of_010 = checksum.starts_with("crc64");
     return out;
   } catch (const std::exception&) {  // of the parser's many kinds, and a map's own
     return no_map("or not a whole one");

@@ -39,6 +39,7 @@ struct FieldMapFile {
   FieldMapNotes notes;
   std::string sha256;                      ///< signed_sha256(), of the text
   std::optional<FileSignature> signature;  ///< empty: it is signed by nobody
+  bool of_010 = false;                     ///< as 0.1.0 wrote it, which signed nothing
 };
 
 /// Refuses what is no such text, a later version, a checksum that does not fit, and a map that makes no sense.

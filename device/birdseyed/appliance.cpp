@@ -177,6 +177,7 @@ wire::Health Appliance::figures(const Core::Counters& before, const Core::Counte
   health.tracker_time_sigma_ms = counters.tracker_time_sigma_ms;
   health.clock = read_wall_clock();
   health.reference = config_.tracker.reference;
+  health.field_unsigned = config_.core.field_unsigned;
   return health;
 }
 

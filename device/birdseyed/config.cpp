@@ -231,21 +231,35 @@ struct SignedFile {
   const std::optional<calibration::FileSignature>& signature;
 };
 
-/// Why birdseyed does not use the file; empty where it may. An error: it is not as it was signed. Whoever is not known
-/// stops no appliance: video needs neither of these files.
-Result<std::string> refusal_of(const SignedFile& file) {
+/// That nobody known has signed a file.
+struct Unsigned {
+  std::string who;      ///< "not signed: nobody says who wrote it"; empty: somebody known has
+  std::string refusal;  ///< with the file's name and the remedy
+};
+
+/// An error: the file is not as it was signed. Whoever is not known stops no appliance: video needs no such file.
+Result<Unsigned> unsigned_by(const SignedFile& file) {
   const std::string& path = file.path;
   const auto folder = identity_folder();
-  const auto machine = folder ? ThisMachine::open(*folder) : Result<ThisMachine>(folder.error());
-  if (!machine) return fmt::format("{}: whose it is cannot be told: {}", path, machine.error().what);
-  const auto author = machine->author_of(file.kind, file.sha256, file.signature);
+  auto opened = folder ? ThisMachine::open(*folder) : Result<ThisMachine>(folder.error());
+  const std::string why_closed = opened ? "" : opened.error().what;
+  // Whether a file is as it was signed can be told without knowing anybody.
+  const ThisMachine machine = opened ? *std::move(opened) : ThisMachine::for_once();
+  const auto author = machine.author_of(file.kind, file.sha256, file.signature);
   if (!author) return author.error();
-  if (author->standing == Author::Standing::known) return std::string();
-  const std::string is = fmt::format("{}: the {} is {}; [calibration] accept_unsigned = true uses it all the same",
-                                     path, file.what, author->words());
-  if (author->standing == Author::Standing::nobody) return is;
-  return fmt::format("{}; to know that machine, add the line \"NAME {}\" to {}", is, author->key.hex(),
-                     (*folder / "known").string());
+  if (!why_closed.empty()) {
+    const std::string untold = "by whom cannot be told: " + why_closed;
+    return Unsigned{untold, fmt::format("{}: the {} is {}", path, file.what, untold)};
+  }
+  if (author->standing == Author::Standing::known) return Unsigned();
+  Unsigned out{author->words(), {}};
+  out.refusal = fmt::format("{}: the {} is {}; [calibration] accept_unsigned = true uses it all the same", path,
+                            file.what, out.who);
+  if (author->standing == Author::Standing::unknown) {
+    out.refusal += fmt::format("; to know that machine, add the line \"NAME {}\" to {}", author->key.hex(),
+                               (*folder / "known").string());
+  }
+  return out;
 }
 
 void read_field_map(const std::string& path, bool accept_unsigned, ConfigSection& section, Config& config) {
@@ -253,18 +267,18 @@ void read_field_map(const std::string& path, bool accept_unsigned, ConfigSection
   if (!text) return section.fail("field", why_unread(path, text.error()));
   auto read = calibration::parse_field_map(*text);
   if (!read) return section.fail("field", read.error().with_context(path).what);
-  auto refusal = refusal_of({path, "map of the field", calibration::kFieldMapFormat, read->sha256, read->signature});
-  if (!refusal) return section.fail("field", refusal.error().with_context(path).what);
-  config.core.field = std::move(read->map);
-  config.core.field_of = std::move(read->notes.tracker);
-  if (refusal->empty()) return;
+  auto unknown = unsigned_by({path, "map of the field", calibration::kFieldMapFormat, read->sha256, read->signature});
+  if (!unknown) return section.fail("field", unknown.error().with_context(path).what);
+  CoreSettings& core = config.core;
+  core.field = std::move(read->map);
+  core.field_of = std::move(read->notes.tracker);
+  if (unknown->who.empty()) return;
   if (!accept_unsigned) {
-    config.core.field_refused = *std::move(refusal);
+    core.field_refused = std::move(unknown->refusal);
     return;
   }
-  std::string& notice = config.core.notice;
-  notice += std::string(notice.empty() ? "" : "; ") +
-            "UNSIGNED: poses are corrected by a map of the field that no known machine signed";
+  core.notice += fmt::format("{}UNSIGNED: the map of the field is {}", core.notice.empty() ? "" : "; ", unknown->who);
+  core.field_unsigned = std::move(unknown->who);
 }
 
 void read_calibration_record(const std::string& path, bool accept_unsigned, ConfigSection& section, Config& config) {
@@ -274,10 +288,10 @@ void read_calibration_record(const std::string& path, bool accept_unsigned, Conf
   if (!text) return section.fail("record", why_unread(path, text.error()));
   const auto record = calibration::parse_signed_record(*text);
   if (!record) return section.fail("record", record.error().with_context(path).what);
-  auto refusal = refusal_of({path, "record", calibration::kRecordFormat, record->sha256, record->signature});
-  if (!refusal) return section.fail("record", refusal.error().with_context(path).what);
+  auto unknown = unsigned_by({path, "record", calibration::kRecordFormat, record->sha256, record->signature});
+  if (!unknown) return section.fail("record", unknown.error().with_context(path).what);
   config.core.calibration = *text;
-  if (!accept_unsigned) config.core.calibration_refused = *std::move(refusal);
+  if (!accept_unsigned) config.core.calibration_refused = std::move(unknown->refusal);
 }
 
 void read_calibration(ConfigSection& section, Config& config) {

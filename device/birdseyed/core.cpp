@@ -69,10 +69,7 @@ void Core::note(const InstrumentChanged& changed) {
   calibration_.note(changed);
   const bool running = changed.state == InstrumentState::running;
   if (changed.instrument == Instrument::tracker) {
-    if (running && settings_.field) {
-      field_fault_ = settings_.field_refused.empty() ? calibration::field_misfit(settings_.field_of, changed.identity)
-                                                     : settings_.field_refused;
-    }
+    if (running && settings_.field) field_fault_ = calibration::field_misfit(settings_.field_of, changed.identity);
     // What was half received will not be completed, and a unit that starts again has another beat.
     if (assembler_) {
       add(counted_, assembler_->counters());
@@ -109,12 +106,13 @@ void Core::tell(Instrument instrument, const std::vector<ClockEvent>& events) {
 
 BirdReading Core::corrected(const BirdReading& reading) {
   const auto& pose = reading.pose;
-  if (!settings_.field || !pose || !pose->position_mm || !pose->rotation) return reading;
+  const bool refused = !settings_.field_refused.empty();
+  if (!(refused || settings_.field) || !pose || !pose->position_mm || !pose->rotation) return reading;
   BirdReading out = reading;
-  if (!field_fault_.empty()) {
+  if (refused || !field_fault_.empty()) {
     ++unmapped_;
     out.pose.reset();
-    out.doubt = field_fault_;
+    out.doubt = refused ? "the map of the tracker's field is not used" : field_fault_;  // STATUS says why
     out.kind = DoubtKind::unmapped;
     return out;
   }
@@ -250,7 +248,8 @@ wire::Status Core::status() const {
   for (std::size_t i = 0; i < birds_.size(); ++i) {
     if (birds_[i].in_status) text += (text.empty() ? "" : "; ") + settings_.bird_names[i] + ": " + birds_[i].why;
   }
-  if (!calibration_.fault().empty()) text += (text.empty() ? "" : "; ") + calibration_.fault();
+  for (const std::string& fault : {calibration_.fault(), settings_.field_refused})
+    if (!fault.empty()) text += (text.empty() ? "" : "; ") + fault;
   const bool ok = text.empty();
   if (!settings_.notice.empty()) text += (ok ? "" : "; ") + settings_.notice;
   return {ok, text};

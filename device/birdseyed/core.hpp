@@ -30,6 +30,7 @@ struct CoreSettings {
   std::optional<calibration::FieldMap> field;  ///< corrects every pose; poses outside the mapped volume are doubted
   calibration::Identity field_of;  ///< the tracker whose field that is; of another every pose is doubted. Empty: any
   std::string field_refused;       ///< why the map is not used, and every pose doubted: nobody known signed it
+  std::string field_unsigned;      ///< that nobody known signed it, where it is used all the same
 };
 
 /// What the appliance knows and says. Pure: the same events in the same order give the same packets, byte for byte.
@@ -74,7 +75,7 @@ class Core {
   void note(const Tick&) {}
   void publish(const drivers::minibird::Measurement& measurement);
   void tell(Instrument instrument, const std::vector<ClockEvent>& events);
-  /// The reading corrected by the field map; doubted where the field was not mapped.
+  /// The reading corrected by the field map; doubted where the field was not mapped, or the map is not used.
   [[nodiscard]] drivers::minibird::BirdReading corrected(const drivers::minibird::BirdReading& reading);
   void note_doubt(std::size_t bird, const drivers::minibird::BirdReading& reading, DeviceTime at);
   void correct_latency(TimedFrame& timed) const;

@@ -75,6 +75,7 @@ void to_json(nlohmann::json& json, const CoreSettings& settings) {
   if (!settings.notice.empty()) json["notice"] = settings.notice;
   if (!settings.field_of.empty()) json["field_of"] = settings.field_of;
   if (!settings.field_refused.empty()) json["field_refused"] = settings.field_refused;
+  if (!settings.field_unsigned.empty()) json["field_unsigned"] = settings.field_unsigned;
 }
 void from_json(const nlohmann::json& json, CoreSettings& settings) {
   json.at("bird_names").get_to(settings.bird_names);
@@ -87,6 +88,7 @@ void from_json(const nlohmann::json& json, CoreSettings& settings) {
   settings.notice = json.value("notice", "");
   if (json.contains("field_of")) json.at("field_of").get_to(settings.field_of);
   settings.field_refused = json.value("field_refused", "");
+  settings.field_unsigned = json.value("field_unsigned", "");
   if (!json.contains("field")) return;
   auto map = calibration::FieldMap::from(json.at("field").get<calibration::FieldMapData>());
   if (!map) throw std::invalid_argument(map.error().what);

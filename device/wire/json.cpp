@@ -53,6 +53,7 @@ void each_of_health(AnyHealth& health, const Each& each) {
   each("clock", health.clock);
   each("recording", health.recording);
   each("reference", health.reference);
+  each("field_unsigned", health.field_unsigned);
 }
 
 }  // namespace

@@ -104,6 +104,9 @@ struct Health {
   WallClock clock;
   std::string recording;  ///< the appliance recording's file, or why there is none; empty: none was asked for
   std::string reference;  ///< the bird that is fixed on patient or table; empty: there is none
+  /// Why nobody known answers for the map of the field that poses are corrected by all the same; empty: somebody does,
+  /// or there is none.
+  std::string field_unsigned;
 };
 
 /// What became of the camera's exposure, gain, white balance and focus, which a client had held or let go.

@@ -186,6 +186,12 @@ HtmlPage page_of(const Fitted& fitted) {
   return page;
 }
 
+Result<std::string> signed_text(const calibration::FieldMap& map, const calibration::FieldMapNotes& notes) {
+  const auto machine = ThisMachine::open();
+  if (!machine) return machine.error();
+  return field_map_text(map, notes, machine->sign(calibration::kFieldMapFormat, signed_sha256(map, notes)));
+}
+
 void run(const CLI::App& field, const CalibrateFieldOptions& options, CommandStatus& status) {
   calibration::Identity tracker;
   if (!options.bind.empty()) {
@@ -199,15 +205,15 @@ void run(const CLI::App& field, const CalibrateFieldOptions& options, CommandSta
   const Verdict verdict = verdict_of(fitted->fit);
   fmt::print("{} of order {}: {:.2f} mm before, {:.2f} mm after, held out\n", name_of(fitted->fit.chosen.basis),
              fitted->fit.chosen.order, fitted->fit.before_mm, fitted->fit.held_out_mm);
-  const auto machine = ThisMachine::open();
-  if (!machine) return status.refuse(machine.error());
   const calibration::FieldMapNotes notes{
       utc_now(),     "birdseye " BIRDSEYE_VERSION, fitted->made_from,
       verdict.grade, fitted->fit.held_out_mm,      calibration::field_of_tracker(tracker)};
-  const calibration::FieldMap& map = fitted->fit.map;
-  const auto signature = machine->sign(calibration::kFieldMapFormat, signed_sha256(map, notes));
-  finish_calibration(options.results, field_map_text(map, notes, signature), json_of(*fitted), page_of(*fitted),
-                     verdict, status);
+  ResultPaths results = options.results;
+  Result<std::string> text = std::string();
+  if (!results.out.empty() && verdict.grade != Grade::fail) text = signed_text(fitted->fit.map, notes);
+  if (!text) results.out.clear();  // what was found is not lost for it
+  finish_calibration(results, text ? *text : "", json_of(*fitted), page_of(*fitted), verdict, status);
+  if (!text) status.refuse(text.error().with_context(options.results.out.string()));
 }
 
 }  // namespace

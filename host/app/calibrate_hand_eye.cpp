@@ -258,7 +258,7 @@ void run(const CLI::App& command, CalibrateHandEyeOptions& options, CommandStatu
   files.pixel_aspect = *aspect;
   if (const auto sound = check(options); !sound) return status.refuse(sound.error());
   if (const auto used = check_use(command, options); !used) return status.refuse(used.error());
-  const auto field = admit_field(options.poses_are.field, options.results);
+  const auto field = admit_field(options.poses_are.field, options.live ? options.plan.server : "", options.results);
   if (!field) return status.refuse(field.error());
   read_how(options, *field);
   if (const auto sound = check_record(options); !sound) return status.refuse(sound.error());

@@ -189,7 +189,7 @@ void run(const CLI::App& command, const CalibrateLatencyOptions& options, Comman
   }
   const auto recording = admit_source(options.recording, options.paths);
   if (!recording) return status.refuse(recording.error());
-  const auto field = admit_field(options.poses_are.field, options.paths);
+  const auto field = admit_field(options.poses_are.field, options.server, options.paths);
   if (!field) return status.refuse(field.error());
   const auto found = files ? of_files(options, *field, odd) : of_appliance(options, *recording, progress);
   if (!found) return status.refuse(found.error());

@@ -7,6 +7,7 @@
 
 #include "drivers/system/program.hpp"
 #include "host/files/write_files.hpp"
+#include "host/link/appliance_hardware.hpp"
 #include "host/texts/texts.hpp"
 
 namespace birdseye::host {
@@ -83,11 +84,18 @@ Result<AdmittedRecording> admit_source(const std::filesystem::path& recording, c
   return admit_recording(recording, *authors);
 }
 
-Result<AdmittedField> admit_field(const std::filesystem::path& map, const ResultPaths& paths) {
-  if (map.empty()) return AdmittedField();
+Result<AdmittedField> admit_field(const std::filesystem::path& map, const std::string& server,
+                                  const ResultPaths& paths) {
+  if (map.empty() && server.empty()) return AdmittedField();
   const auto authors = Authors::of_this_machine(paths.accept_unsigned);
   if (!authors) return authors.error();
-  return read_field_map(map, *authors);
+  if (!map.empty()) return read_field_map(map, *authors);
+  const auto doubt = ask_field_doubt(server);
+  if (!doubt) return doubt.error();
+  if (doubt->empty()) return AdmittedField();
+  const std::string what = "its map of the field is " + *doubt;
+  if (const auto admitted = authors->admit_resting_on(what); !admitted) return admitted.error().with_context(server);
+  return AdmittedField{std::nullopt, *doubt};
 }
 
 void tell_doubts(const AdmittedRecording& recording, const AdmittedField& field, Verdict& verdict) {

@@ -31,8 +31,10 @@ void allow_unsigned_sources(CLI::App& command);
 
 /// Whose recording a calibration goes by, by the rule for all recordings. Of an empty path, nobody's.
 Result<AdmittedRecording> admit_source(const std::filesystem::path& recording, const ResultPaths& paths);
-/// Whose map of the field it corrects poses by, likewise.
-Result<AdmittedField> admit_field(const std::filesystem::path& map, const ResultPaths& paths);
+/// Whose map of the field it corrects poses by, likewise, or whose map the appliance at `server` has corrected them by.
+/// map, server: empty where there is none.
+Result<AdmittedField> admit_field(const std::filesystem::path& map, const std::string& server,
+                                  const ResultPaths& paths);
 /// What the verdict says of them: it passes no more where no known machine signed one.
 void tell_doubts(const AdmittedRecording& recording, const AdmittedField& field, Verdict& verdict);
 

@@ -42,7 +42,9 @@ struct Found {
   std::string why_unsigned;         ///< more than that it is; or empty
 };
 
-/// A record or an operation that cannot be read is not as it was written either: its own sums tell.
+constexpr const char* k010SignedNothing = "it is of version 0.1, which signed nothing";
+
+/// A record, a map or an operation that cannot be read is not as it was written either: its own sums tell.
 Found changed(const std::string& what, const Error& error) {
   return {what, "", "", std::nullopt, {error.what}, ""};
 }
@@ -51,16 +53,15 @@ Found of_record(const fs::path& path) {
   constexpr const char* kWhat = "calibration record";
   const auto read = read_signed_record(path);
   if (!read) return changed(kWhat, read.error());
-  return {kWhat,        calibration::kRecordFormat,
-          read->sha256, read->signature,
-          {},           read->of_010 ? "it is of version 0.1, which signed nothing" : ""};
+  return {kWhat, calibration::kRecordFormat, read->sha256, read->signature, {}, read->of_010 ? k010SignedNothing : ""};
 }
 
 Found of_field_map(const fs::path& path) {
   constexpr const char* kWhat = "map of the field";
   const auto read = read_field_map(path);
   if (!read) return changed(kWhat, read.error());
-  return {kWhat, calibration::kFieldMapFormat, read->sha256, read->signature, {}, ""};
+  return {kWhat, calibration::kFieldMapFormat,         read->sha256, read->signature,
+          {},    read->of_010 ? k010SignedNothing : ""};
 }
 
 Found of_operation(const fs::path& path) {
@@ -120,7 +121,8 @@ Result<std::vector<Found>> found_at(const fs::path& path) {
     out.push_back(of_session(path.parent_path().empty() ? fs::path(".") : path.parent_path()));
   } else if (begins_as(calibration::kRecordFormat, path)) {
     out.push_back(of_record(path));
-  } else if (begins_as(calibration::kFieldMapFormat, path)) {
+  } else if (begins_as(calibration::kFieldMapFormat, path) ||
+             read_field_map(path)) {  // its keys may stand in any order
     out.push_back(of_field_map(path));
   } else if (const auto read = read_signed_operation(path); read || begins_as(kOperationFormat, path)) {
     out.push_back(of_operation(path));
@@ -171,7 +173,8 @@ Result<ExitCode> run(const VerifyOptions& options) {
     fmt::print("{} {}\nfingerprint {}\n", machine->name(), own.hex(), own.fingerprint());
   }
   if (options.paths.empty() && !options.key)
-    return Error{Errc::bad_value, "verify: name a record, a map, an operation or a recording, or give --key"};
+    return Error{Errc::bad_value,
+                 "verify: name a record, a map of the field, an operation or a recording, or give --key"};
   bool good = true;
   for (const fs::path& path : options.paths) {
     const auto found = found_at(path);

@@ -43,7 +43,7 @@ struct FiducialInput {
   std::vector<std::size_t> ct_of_touch;  ///< empty where the files' order or names hold
   std::vector<std::string> names;        ///< one for each touch where both files name their points; else empty
   std::vector<std::string> notes;        ///< what was done to the points, to be told
-  std::string field_doubt;               ///< of the map that corrected them: why nobody known answers for it; or empty
+  std::string field_doubt;               ///< why the author of the map that corrected them is not known; empty: it is
 };
 
 /// All that was found out.

@@ -12,6 +12,7 @@ namespace birdseye::host {
 namespace {
 
 constexpr Duration kHardwarePatience = Duration::from_ms(10'000);
+constexpr Duration kHealthPatience = Duration::from_ms(3000);
 
 /// Why not all that are named run; empty when they do, and then their identities are in told.
 std::string gather(const wire::Health& health, const std::vector<std::string>& names, Hardware& told) {
@@ -48,6 +49,18 @@ Result<Hardware> ask_hardware(const std::string& address, const std::vector<std:
     Hardware told;
     missing = gather(*health, names, told);
     if (missing.empty()) return told;
+  }
+}
+
+Result<std::string> ask_field_doubt(const std::string& address) {
+  auto client = connect_appliance(address);
+  if (!client) return client.error();
+  const Deadline deadline = Deadline::after(kHealthPatience);
+  for (;;) {
+    const auto event = (*client)->next(deadline);
+    if (!event) return event.error();
+    if (!*event || deadline.passed()) return std::string();
+    if (const auto* health = std::get_if<wire::Health>(&**event)) return health->field_unsigned;
   }
 }
 

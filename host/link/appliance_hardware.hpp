@@ -16,6 +16,10 @@ using Hardware = std::map<std::string, calibration::Identity>;
 /// instrument that does not run, with its reason.
 Result<Hardware> ask_hardware(const std::string& address, const std::vector<std::string>& names);
 
+/// Why nobody known answers for the map of the field by which the appliance corrects its poses; empty where somebody
+/// does, where it has no such map, and where a server tells nothing of its health within 3 s. Errors: no appliance.
+Result<std::string> ask_field_doubt(const std::string& address);
+
 /// An error where the calibration record is bound to other hardware than `told`.
 Result<void> check_hardware(const calibration::CalibrationRecord& record, const Hardware& told);
 

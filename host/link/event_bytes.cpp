@@ -25,7 +25,7 @@ std::size_t texts_of(const wire::Status& status) {
   return status.text.size();
 }
 std::size_t texts_of(const wire::Health& health) {
-  std::size_t bytes = health.recording.size() + health.reference.size();
+  std::size_t bytes = health.recording.size() + health.reference.size() + health.field_unsigned.size();
   for (const wire::InstrumentHealth& instrument : health.instruments) {
     bytes += sizeof instrument + instrument.text.size();
     for (const auto& [key, value] : instrument.identity) bytes += key.size() + value.size();

@@ -121,6 +121,7 @@ void LiveWorkflow::take_relative(const wire::Event& event, HostTime now, const s
   } else if (const auto* health = std::get_if<wire::Health>(&event)) {
     connection_.take(*health);
     instruments_.take(*health);
+    if (!health->field_unsigned.empty()) field_doubt_ = health->field_unsigned;
     if (settings_.reference.empty()) use_reference(health->reference);
     judge_instruments();
   } else if (const auto* status = std::get_if<wire::Status>(&event)) {

@@ -167,6 +167,8 @@ class LiveWorkflow {
   std::string record_sha256_;  ///< of the last record that was in force
   /// That no known machine signed the record that is in force, or the operation that was taken up; empty: one did.
   std::string record_doubt_, operation_doubt_;
+  /// Of the map by which the appliance corrects poses. Once told it stays: what was found by such poses rests on it.
+  std::string field_doubt_;
   std::uint64_t shapes_ = 0;
 
   ConnectionStep connection_;

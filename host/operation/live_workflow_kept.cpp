@@ -45,7 +45,7 @@ void LiveWorkflow::keep() {
   operation.registered = fiducials_.registered_or_held_back();
   operation.deformed = deformation_.found();
   // What the next window finds in it rests on the same.
-  for (const std::string* doubt : {&record_doubt_, &operation_doubt_, &settings_.recording_doubt}) {
+  for (const std::string* doubt : {&record_doubt_, &operation_doubt_, &settings_.recording_doubt, &field_doubt_}) {
     if (operation.doubt.empty()) operation.doubt = *doubt;
   }
   keeper_.keep(std::move(operation));
@@ -92,6 +92,7 @@ void LiveWorkflow::tell_unsigned(OperationView& view) const {
   tell(words("unsigned_record"), record_doubt_, LiveStep::calibrate);
   tell(words("unsigned_operation"), operation_doubt_, LiveStep::fiducials);
   tell(words("unsigned_recording"), settings_.recording_doubt, LiveStep::connect);
+  tell(words("unsigned_field"), field_doubt_, LiveStep::connect);
 }
 
 }  // namespace birdseye::host

@@ -155,9 +155,13 @@ TEST(CoreWithAFieldMap, AMapOfNobodyKnownLetsNoPoseThrough) {
   settings.field_refused = "field.json: the map of the field is not signed";
   Core core(settings);
   const auto said = told(core, session(4, 1));
+  ASSERT_FALSE(only<wire::Status>(said).empty());
+  EXPECT_NE(only<wire::Status>(said).front().text.find(settings.field_refused), std::string::npos)
+      << only<wire::Status>(said).front().text;
   for (const auto& birds : only<wire::Birds>(said)) EXPECT_TRUE(birds.birds.empty());
   for (const auto& frame : only<wire::VideoFrame>(said)) EXPECT_FALSE(frame.info.pose.tracker_from_sensor);
   EXPECT_NE(core.status_text().find(settings.field_refused), std::string::npos) << core.status_text();
+  EXPECT_NE(core.status_text().find("scope: the map of the tracker's field is not used"), std::string::npos);
 }
 
 TEST(CoreWithAFieldMap, ReplaysToTheSameBytes) {
@@ -233,7 +237,9 @@ TEST(ConfigOfAFieldMap, OfNobodyKnownIsNotUsedUnlessAskedTo) {
         read_config(scratch.file("c.toml", config_with(scratch.file("field.json", text)) + "accept_unsigned = true\n"));
     ASSERT_TRUE(used) << used.error().what;
     EXPECT_EQ(used->core.field_refused, "");
-    EXPECT_EQ(used->core.notice.starts_with("UNSIGNED: "), text != signed_by(*own)) << used->core.notice;
+    const bool known = text == signed_by(*own);
+    EXPECT_EQ(used->core.notice.starts_with("UNSIGNED: the map of the field is "), !known) << used->core.notice;
+    EXPECT_EQ(used->core.field_unsigned.empty(), known);
   }
   const auto copied = own->sign(calibration::kFieldMapFormat, std::string(64, '0'));
   EXPECT_NE(

@@ -244,6 +244,43 @@ TEST_F(MappedByCommand, AMapOfNobodyKnownIsUsedOnlyWhenAskedTo) {
     expect_refused("birdseye", command + changed + " --accept-unsigned", {"changed.json: ", "was changed since"});
     EXPECT_EQ(run("birdseye", command + map).output.find("UNSIGNED"), std::string::npos);
   }
+  for (const char* const command :
+       {"calibrate latency --poses a.csv --eye-poses b.csv", "calibrate hand-eye --poses a.csv --eye-poses b.csv"})
+    expect_refused("birdseye", command + (" --field " + nobodys), {"nobodys.json: the map of the field is not signed"});
+}
+
+TEST_F(MappedByCommand, TheApplianceAndTheDailyCheckSayThatNobodyKnownSignedAMap) {
+  const auto own = calibration::parse_field_map(testing::contents_of(map));
+  ASSERT_TRUE(own);
+  const std::string nobodys = scratch.file("nobodys.json", calibration::field_map_text(own->map, own->notes));
+  const std::string cart =
+      "[tracker]\ndevice = \"/dev/ttyS0\"\n[camera]\nsource = \"v4l2:/dev/video0\"\n"
+      "[calibration]\nfield = \"" +
+      nobodys + "\"\n";
+  const auto told = run("birdseyed", "--check --config " + scratch.file("cart.toml", cart));
+  EXPECT_EQ(told.code, 0);
+  EXPECT_NE(told.output.find("nobodys.json: the map of the field is not signed"), std::string::npos) << told.output;
+  const std::string plate = scratch.file("plate.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\nd3,0,80,0\nd4,80,80,0\n");
+  const std::string check = "calibrate field check --plate " + plate + " --measured " +
+                            scratch.file("m.csv", "name,x,y,z\nd1,300,0,0\nd2,380,0,0\nd3,300,80,0\nd4,380,80,0\n") +
+                            " --history " + (scratch / "h.csv").string() + " --field ";
+  EXPECT_NE(run("birdseye", check + nobodys).output.find("nobodys.json: not signed"), std::string::npos);
+  auto notes = own->notes;
+  notes.held_out_mm /= 2;
+  expect_refused("birdseye",
+                 check + scratch.file("changed.json", calibration::field_map_text(own->map, notes, own->signature)),
+                 {"changed.json: ", "was changed since"});
+}
+
+TEST_F(MappedByCommand, WithoutAKeyTheMapAloneIsNotWritten) {
+  const auto done = run("birdseye",
+                        "calibrate field --grid " + (scratch / "grid.csv").string() + " --held-alike --out " +
+                            (scratch / "unsigned.json").string() + " --json " + (scratch / "r.json").string(),
+                        "env -u BIRDSEYE_IDENTITY -u STATE_DIRECTORY -u XDG_CONFIG_HOME -u HOME");
+  EXPECT_EQ(done.code, 2) << done.output;
+  EXPECT_NE(done.output.find("unsigned.json: "), std::string::npos) << done.output;
+  EXPECT_FALSE(fs::exists(scratch / "unsigned.json"));
+  EXPECT_TRUE(fs::exists(scratch / "r.json"));
 }
 
 TEST_F(MappedByCommand, TouchedFiducialsAreCorrectedAndThoseBeyondTheMapRefused) {

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "calibration/record/field_map_file.hpp"
 #include "device/birdseyed/recorder.hpp"
@@ -62,6 +63,10 @@ TEST(VerifyCommand, SaysByWhomAndWhenEachKindWasSigned) {
     expect((scratch / name).string(), 0, {std::string(name) + what + by, "and as it was signed"});
   }
   expect((scratch / "record.json").string() + " " + (scratch / "session").string(), 0, {"record.json: ", "session: "});
+  nlohmann::ordered_json turned;
+  const auto sorted = nlohmann::json::parse(testing::contents_of(scratch / "field.json"));
+  for (auto one = sorted.rbegin(); one != sorted.rend(); ++one) turned[one.key()] = one.value();
+  expect(scratch.file("turned.json", turned.dump()), 0, {": map of the field: " + by, "and as it was signed"});
 }
 
 TEST(VerifyCommand, NoNameInAFileStandsForALineOfItsOwn) {
@@ -147,7 +152,7 @@ TEST(VerifyCommand, RefusesWhatItCannotJudge) {
   const Scratch scratch;
   testing::expect_refused("birdseye", "verify " + (scratch / "none").string(), {"no such file or folder"});
   testing::expect_refused("birdseye", "verify " + scratch.file("some.txt", "text"), {"nothing that Birdseye signs"});
-  testing::expect_refused("birdseye", "verify", {"name a record, an operation or a recording"});
+  testing::expect_refused("birdseye", "verify", {"name a record, a map of the field, an operation or a recording"});
   testing::expect_refused("birdseye", "verify " + scratch.file("record.json", calibration::record_text(record())),
                           {"HOME is not set"}, {},
                           "env -u BIRDSEYE_IDENTITY -u HOME -u XDG_CONFIG_HOME -u STATE_DIRECTORY");

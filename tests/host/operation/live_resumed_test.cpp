@@ -81,6 +81,24 @@ TEST(LiveWorkflow, WhatRestsOnAnUnsignedRecordIsNoBetterForBeingSignedAfterwards
   EXPECT_EQ(workflow.view().not_signed, "operation");
 }
 
+TEST(LiveWorkflow, AMapOfTheFieldThatNobodyKnownSignedIsSaidAndRestedOn) {
+  const Scratch scratch;
+  LiveWorkflow workflow(operation_settings(scratch));
+  connect(workflow);
+  give_record(workflow);
+  EXPECT_EQ(workflow.view().not_signed, "");
+  wire::Health health;
+  health.state = "ready";
+  health.field_unsigned = "not signed: nobody says who wrote it";
+  workflow.take(health, HostTime{0}, std::nullopt);
+  EXPECT_EQ(workflow.view().not_signed, "map of the field");
+  EXPECT_NE(workflow.view().note(LiveStep::connect).line.find("UNSIGNED: not signed"), std::string::npos)
+      << workflow.view().note(LiveStep::connect).line;
+  health.field_unsigned.clear();
+  workflow.take(health, HostTime{0}, std::nullopt);
+  EXPECT_EQ(workflow.view().not_signed, "map of the field") << "what was found by its poses rests on it";
+}
+
 TEST(LiveWorkflow, AnOperationOfAnUnknownMachineIsNotTakenUp) {
   const Scratch scratch;
   const ThisMachine other = ThisMachine::for_once();
