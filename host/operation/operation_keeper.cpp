@@ -34,15 +34,20 @@ Result<std::optional<Operation>> OperationKeeper::take_up(const std::string& ct_
   return std::optional(*std::move(operation));
 }
 
+OperationKeeper::~OperationKeeper() {
+  if (newest_ != written_) write();
+}
+
 void OperationKeeper::keep(Operation operation) {
   if (out_.empty() || !resume_.empty()) return;
   operation.made_utc = utc_now();
   newest_ = std::make_shared<const Operation>(std::move(operation));
-  write();
+  tick();
 }
 
 void OperationKeeper::write() {
   again_.reset();
+  written_ = newest_;
   writing_.start([out = out_, machine = authors_.machine, kept = newest_](const std::stop_token&, const auto&) {
     return write_operation(out, *kept, *machine);
   });
@@ -50,11 +55,14 @@ void OperationKeeper::write() {
 
 void OperationKeeper::tick() {
   constexpr Duration kAgainAfter = Duration::from_ms(5000);
+  // What is being written ends first: what became of it would be lost otherwise, and a disk that is full and slow would
+  // not be told of where something new is found again and again.
+  if (writing_.running()) return;
   if (const auto written = writing_.take()) {
     fault_ = *written ? "" : words("note_not_kept", written->error().what);
     if (!*written) again_ = Deadline::after(kAgainAfter);
   }
-  if (again_ && again_->passed() && !writing_.running()) write();
+  if (newest_ != written_ || (again_ && again_->passed())) write();
 }
 
 }  // namespace birdseye::host

@@ -18,15 +18,19 @@ class OperationKeeper {
   /// out: where to; empty: nowhere. resume: what is to be taken up, if authors
   /// admit it; or empty.
   OperationKeeper(std::filesystem::path out, std::filesystem::path resume, Authors authors);
+  ~OperationKeeper();
+  OperationKeeper(const OperationKeeper&) = delete;
+  OperationKeeper& operator=(const OperationKeeper&) = delete;
 
   /// Of another CT or other labels nothing is taken up. Once: the second time, and where nothing was to be taken up, it
   /// is empty. An error names the folder; nothing is written into it from then on, for what is there may yet be needed.
   Result<std::optional<Operation>> take_up(const std::string& ct_sha256, const std::string& labels_sha256);
   /// Stamped now. Not before what is there has been taken up. Of several in a row the last is written at any rate.
   void keep(Operation operation);
-  /// Hears what became of the last that was written. Where it could not be, it is written again every five seconds.
+  /// Hears what became of each that was written, and begins the next. What could not be kept is written again every
+  /// five seconds.
   void tick();
-  [[nodiscard]] bool writing() const { return writing_.running(); }
+  [[nodiscard]] bool writing() const { return writing_.running() || newest_ != written_; }
   /// Why it could not be kept.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 
@@ -36,8 +40,9 @@ class OperationKeeper {
   std::filesystem::path out_, resume_;
   Authors authors_;
   Background<Result<void>> writing_;
-  std::shared_ptr<const Operation> newest_;  ///< that was to be kept
-  std::optional<Deadline> again_;            ///< once what could not be kept is written again
+  std::shared_ptr<const Operation> newest_;   ///< that was to be kept
+  std::shared_ptr<const Operation> written_;  ///< whose writing was begun last
+  std::optional<Deadline> again_;             ///< once what could not be kept is written again
   std::string fault_;
 };
 

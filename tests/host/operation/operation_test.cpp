@@ -352,6 +352,9 @@ TEST(OperationKeeper, SaysWhatCannotBeKept) {
   OperationKeeper keeper(scratch.file("a file", ""), {}, testing::authors());
   keeper.keep(whole_operation());
   wait_for(keeper);
+  keeper.keep(whole_operation());
+  EXPECT_NE(keeper.fault().find("operation.json"), std::string::npos) << "of the former: " << keeper.fault();
+  wait_for(keeper);
   keeper.tick();
   EXPECT_NE(keeper.fault().find("operation.json"), std::string::npos) << keeper.fault();
 }

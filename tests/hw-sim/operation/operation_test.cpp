@@ -195,6 +195,13 @@ TEST(Operation, AWindowWhoseDiskIsFullSaysSoAndGoesOn) {
   EXPECT_EQ(out.log.find("step fiducials", opened), std::string::npos) << out.log;
 }
 
+/// Seed 52709211. The next touch came before the disk had told what became of the last, which nobody heard of then.
+TEST(Operation, AFullDiskThatTellsLateIsToldWhateverIsFoundMeanwhile) {
+  const auto late = usual(FaultKind::disk_late, 1, 60, {{"ms", 3000}}), full = usual(FaultKind::disk_full, 1, 60);
+  const OperationOutcome out = operate({.seed = 11, .minutes = 1.5, .faults = programs_end({late, full})});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+}
+
 TEST(Operation, ALateDiskDelaysNoPicture) {
   const auto late = usual(FaultKind::disk_late, 1, 110, {{"ms", 1500}});
   const OperationOutcome out = operate({.seed = 11, .minutes = 2, .faults = programs_end({late})});
