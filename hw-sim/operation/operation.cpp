@@ -45,7 +45,6 @@ constexpr double kAtBoard = 0.3;  // of operations with pictures: the scope is c
 constexpr double kFaultsFrom_s = 20, kQuietAtEnd_s = 10;
 constexpr Duration kScreen = Duration::from_ms(20);  // from one picture on the screen to the next
 constexpr double kActs_s = 0.1;                      // from one look of the surgeon to the next
-constexpr const char* kReference = "reference";
 
 /// A log with the operation's time before each line, and a hash of more than it tells.
 class Journal {

@@ -180,6 +180,7 @@ void OperationLaws::take(const wire::Event& event, HostTime now) {
 void OperationLaws::opened(std::size_t checks) {
   accused_ = false;
   to_take_up_ = !kept_fre_mm_.empty();
+  held_back_ = false;
   ready_since_s_.reset();
   unsaid_since_s_.reset();
   checks_when_opened_ = to_take_up_ ? std::optional(checks) : std::nullopt;
@@ -196,6 +197,12 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
   if (unwatched_to_s_ && now_s > *unwatched_to_s_ && (view.unconfirmed || !registered_)) unwatched_to_s_.reset();
   if (checks_when_opened_ && (checks > *checks_when_opened_ || !view.touches.empty())) checks_when_opened_.reset();
   if (!to_take_up_) return;
+  // Before the window has heard of the reference it has taken up what it does not use yet, and a touch drops that.
+  held_back_ |= view.note(LiveStep::fiducials).line == host::words("held_reference_gone", kReference);
+  if (held_back_ && !view.touches.empty()) {
+    to_take_up_ = false;
+    return;
+  }
   const bool asks = view.asks_for_instruments || view.asks_for_patient;
   const bool ready = !asks && view.note(LiveStep::connect).done && view.note(LiveStep::calibrate).done;
   if (!ready) return ready_since_s_.reset();

@@ -111,6 +111,7 @@ class OperationLaws {
   /// since. Empty: none was kept, or it may have been taken back.
   std::vector<double> kept_fre_mm_;
   bool to_take_up_ = false;                        ///< the window has still to say what it took up
+  bool held_back_ = false;                         ///< it has said that it does not use that
   std::optional<std::size_t> checks_when_opened_;  ///< of a window that takes up; empty: one was checked since
   Figures figures_;
   std::vector<BrokenLaw> broken_;

@@ -18,6 +18,9 @@
 
 namespace birdseye::hw_sim {
 
+/// By its name, the bird that is fixed on the patient, where there is one.
+inline constexpr const char* kReference = "reference";
+
 /// Where everything of an operation truly is, at any time of it (s). All of it follows from a seed, but for the way of
 /// the pointer, which the surgeon decides as the operation goes.
 class OperationTruth {
