@@ -266,11 +266,12 @@ def kept():
     polynomial = {"kind": "polynomial", "order": 1, "box_mm": [[-100, -100, -100], [100, 100, 100]], "centres_mm": [],
                   "position_mm": [[1, 2, 3]] * 4, "rotation_rad": [], "sigma_mm": [1] * 729}
     start = {"format": "birdseye field map", "version": 1, "held_out_mm": 0.7, "tracker": {"model": "m"}, **MADE}
+    signed = {"signed": {"machine": "m", "key": "0" * 32, "utc": "u", "signature": "0" * 32}}
     for name, field in (("polynomial", polynomial),
                         ("distances", {**polynomial, "kind": "rbf", "centres_mm": [[0, 0, 0]], "position_mm": [[0, 0, 0]] * 5,
                                        "rotation_rad": [[0, 0, 0]] * 5})):
-        signed = {"signed": {"machine": "m", "key": "0" * 64, "utc": MADE["made_utc"], "signature": "0" * 128}} if name == "distances" else {}
-        yield "field_map", name, json.dumps({**start, **signed, "map": field}, separators=(",", ":")).encode()
+        by = signed if name == "distances" else {}
+        yield "field_map", name, json.dumps({**start, **by, "map": field}, separators=(",", ":")).encode()
     floats = base64.b64encode(zlib.compress(struct.pack("<24f", *range(24)))).decode()
     calibrated = {"made_utc": MADE["made_utc"], "made_from": "board", "tracker": {"model": "m"}, "camera": {},
                   "lens": {"width_px": 768, "height_px": 576, "fx_fy_cx_cy_k1_k2_p1_p2_k3": [608, 606, 383, 287, 0, 0, 0, 0, 0],
