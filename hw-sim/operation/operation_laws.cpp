@@ -197,9 +197,11 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
   if (unwatched_to_s_ && now_s > *unwatched_to_s_ && (view.unconfirmed || !registered_)) unwatched_to_s_.reset();
   if (checks_when_opened_ && (checks > *checks_when_opened_ || !view.touches.empty())) checks_when_opened_.reset();
   if (!to_take_up_) return;
-  // Before the window has heard of the reference it has taken up what it does not use yet, and a touch drops that.
-  held_back_ |= view.note(LiveStep::fiducials).line == host::words("held_reference_gone", kReference);
-  if (held_back_ && !view.touches.empty()) {
+  // Before the window has heard of the reference it has taken up what it does not use yet. A touch drops that, and goes
+  // itself once the reference is there.
+  const std::string& line = view.note(LiveStep::fiducials).line;
+  held_back_ |= line == host::words("held_reference_gone", kReference);
+  if (held_back_ && (!view.touches.empty() || line == host::words("note_touch_anew"))) {
     to_take_up_ = false;
     return;
   }

@@ -150,9 +150,11 @@ TEST(Operation, MendedSeed108797437DroppedItsRegistrationItself) {
 
 /// A law was wrong: it took for lost what a touch had dropped before the window that was opened again had heard of the
 /// reference.
-TEST(Operation, MendedSeed260668121TouchedAnewBeforeTheReferenceWasKnown) {
-  const OperationOutcome out = operate({.seed = 260668121, .minutes = 6});
-  EXPECT_TRUE(out.broken.empty()) << told(out);
+TEST(Operation, MendedSeedsTouchedAnewBeforeTheReferenceWasKnown) {
+  for (const auto& [seed, minutes] : {std::pair{260668121U, 6.0}, {145140002U, 9.0}}) {
+    const OperationOutcome out = operate({.seed = seed, .minutes = minutes});
+    EXPECT_TRUE(out.broken.empty()) << told(out);
+  }
 }
 
 /// The window keeps what it has after each touch from the third on; the power goes after any of the syncs of that, or
