@@ -55,7 +55,7 @@ std::size_t bird_of(const std::string& name) {
 
 OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& faults, ExposedNs exposed_ns,
                              std::int64_t zero_ns)
-    : truth_(truth), exposed_ns_(std::move(exposed_ns)), zero_ns_(zero_ns) {
+    : truth_(truth), exposed_ns_(std::move(exposed_ns)), zero_ns_(zero_ns), begins_at_board_(truth.at_board(0)) {
   for (const FaultTarget target : kFaultTargets) {
     for (const Fault& fault : faults.of(target)) {
       const FaultSigns signs = target == FaultTarget::world ? FaultSigns{} : signs_of(fault, target);
@@ -124,9 +124,9 @@ void OperationLaws::take(const wire::Birds& birds, double now_s) {
 
 void OperationLaws::take(const wire::VideoFrame& frame, double now_s) {
   ++figures_.frames;
+  whole_picture_ = frame.width_px == truth_.lens().width_px;
   for (Span& span : spans_) {
-    if (span.signs.half_size && now_s >= span.begins_s && !span.named_s && frame.width_px != truth_.lens().width_px)
-      span.named_s = now_s;
+    if (span.signs.half_size && now_s >= span.begins_s && !span.named_s && !whole_picture_) span.named_s = now_s;
   }
   const PoseAnswer& pose = frame.info.pose;
   if (!pose.tracker_from_sensor) return;
@@ -179,8 +179,10 @@ void OperationLaws::take(const wire::Event& event, HostTime now) {
 
 void OperationLaws::opened(std::size_t checks) {
   accused_ = false;
-  to_take_up_ = !kept_fre_mm_.empty();
+  to_take_up_ = !kept_.empty();
   held_back_ = false;
+  board_to_take_up_ = board_kept_;
+  may_calibrate_since_s_.reset();
   ready_since_s_.reset();
   unsaid_since_s_.reset();
   checks_when_opened_ = to_take_up_ ? std::optional(checks) : std::nullopt;
@@ -196,9 +198,31 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
   registered_ = view.note(LiveStep::fiducials).done;
   if (unwatched_to_s_ && now_s > *unwatched_to_s_ && (view.unconfirmed || !registered_)) unwatched_to_s_.reset();
   if (checks_when_opened_ && (checks > *checks_when_opened_ || !view.touches.empty())) checks_when_opened_.reset();
+  judge_calibration_kept(view, now_s);
+  judge_registration_kept(view, now_s);
+}
+
+void OperationLaws::judge_calibration_kept(const host::OperationView& view, double now_s) {
+  using host::LiveStep;
+  if (!board_to_take_up_) return;
+  if (view.note(LiveStep::calibrate).done) {
+    board_to_take_up_ = false;
+    return;
+  }
+  const bool asks = view.asks_for_instruments || view.asks_for_patient;
+  if (asks || !whole_picture_ || !view.note(LiveStep::connect).done) return may_calibrate_since_s_.reset();
+  const double since_s = may_calibrate_since_s_.value_or(now_s);
+  may_calibrate_since_s_ = since_s;
+  if (now_s - since_s < kTakesUpWithin_s) return;
+  board_to_take_up_ = false;
+  break_law(now_s, "kept", "the window was opened again, and the scope is not calibrated any more");
+}
+
+void OperationLaws::judge_registration_kept(const host::OperationView& view, double now_s) {
+  using host::LiveStep;
   if (!to_take_up_) return;
-  // Before the window has heard of the reference it has taken up what it does not use yet. A touch drops that, and goes
-  // itself once the reference is there.
+  // Before the window has heard of the reference it holds back the registration that it took up. Where somebody touches
+  // meanwhile, that drops the registration; and as the window hears of the reference, it drops the touch too.
   const std::string& line = view.note(LiveStep::fiducials).line;
   held_back_ |= line == host::words("held_reference_gone", kReference);
   if (held_back_ && (!view.touches.empty() || line == host::words("note_touch_anew"))) {
@@ -212,29 +236,38 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
   ready_since_s_ = since_s;
   if (view.note(LiveStep::fiducials).done) {
     to_take_up_ = false;
-    if (!view.touches.empty() || is_kept(view.fre_mm)) return;
-    return break_law(now_s, "kept", "the window was opened again, and has another registration than was kept");
+    const std::optional<Found> found = found_in(view);
+    if (!view.touches.empty() || (found && is_kept(*found))) return;
+    return break_law(now_s, "kept",
+                     "the window was opened again, and has another registration or deformation than was kept");
   }
   if (now_s - since_s < kTakesUpWithin_s) return;
   to_take_up_ = false;
   break_law(now_s, "kept", "the window was opened again, and the patient is not registered any more");
 }
 
-bool OperationLaws::is_kept(const std::optional<double>& fre_mm) const {
+std::optional<OperationLaws::Found> OperationLaws::found_in(const host::OperationView& view) {
+  if (!view.note(host::LiveStep::fiducials).done || !view.fre_mm) return std::nullopt;
+  return Found{*view.fre_mm, view.deformed ? view.deformed->made_utc : std::string()};
+}
+
+bool OperationLaws::is_kept(const Found& found) const {
   constexpr double kSame_mm = 1e-6;
-  return fre_mm && std::ranges::any_of(kept_fre_mm_, [&](double one) { return std::abs(one - *fre_mm) < kSame_mm; });
+  return std::ranges::any_of(kept_, [&](const Found& one) {
+    return std::abs(one.fre_mm - found.fre_mm) < kSame_mm && one.deformed_utc == found.deformed_utc;
+  });
 }
 
 void OperationLaws::take_kept(const host::OperationView& view, std::uint64_t failed_syncs, bool powerless,
                               HostTime now) {
   const double now_s = at_s(now.ns);
+  const bool all_kept = !view.writing && view.fault.empty() && !powerless;
+  board_kept_ |= all_kept && begins_at_board_ && view.note(host::LiveStep::calibrate).done;
   // What a window has not taken up yet is there all the same.
   if (!to_take_up_) {
-    const bool registered = view.note(host::LiveStep::fiducials).done && view.fre_mm;
-    const bool all_kept = !view.writing && view.fault.empty() && !powerless;
-    if (all_kept || !registered) kept_fre_mm_.clear();
-    if (registered && !is_kept(view.fre_mm) && (all_kept || !kept_fre_mm_.empty()))
-      kept_fre_mm_.push_back(*view.fre_mm);
+    const std::optional<Found> found = found_in(view);
+    if (all_kept || !found) kept_.clear();
+    if (found && !is_kept(*found) && (all_kept || !kept_.empty())) kept_.push_back(*found);
   }
   if (std::exchange(failed_syncs_, failed_syncs) < failed_syncs && !unsaid_since_s_) unsaid_since_s_ = now_s;
   const bool said = view.fault.starts_with(host::words("note_not_kept", ""));

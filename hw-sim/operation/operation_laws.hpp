@@ -33,9 +33,10 @@ struct BrokenLaw {
 /// - named: a fault that befalls alone is named within 2 s, where anybody can see it.
 /// - over: within 2 s of the end of a fault that befalls alone, poses and frames with poses are there again.
 /// - accused: later than 10 s after the last fault's end the window does not begin to say that video and poses differ.
-/// - kept: a window that is opened again takes up the registration that the one before had as it was last neither
-///   writing nor said that something was not kept, or a later one of it, and draws nothing before a landmark has been
-///   checked. A window that cannot keep something says so within 2 s.
+/// - kept: a window that is opened again takes up what the one before had as it was last neither writing nor said that
+///   something was not kept, or what it had later: the registration with its deformation, and the calibration over the
+///   board. It draws nothing before a landmark has been checked. A window that cannot keep something says so within 2
+///   s.
 class OperationLaws {
  public:
   /// exposed_ns: of a frame by its number, as the camera knows it. zero_ns: when the operation's time begins.
@@ -79,6 +80,11 @@ class OperationLaws {
   struct Move {
     double begins_s = 0, ends_s = 0;
   };
+  /// How a patient is registered, and the organ deformed, by what tells one from another.
+  struct Found {
+    double fre_mm = 0;
+    std::string deformed_utc;  ///< when that was found; empty: the CT is shown as it was taken
+  };
   [[nodiscard]] double at_s(std::int64_t ns) const { return static_cast<double>(ns - zero_ns_) * 1e-9; }
   void break_law(double at_s, const char* law, std::string what);
   void judge_pose(const char* of, std::size_t bird, const Transform<Tracker, Sensor>& told, double true_s, double now_s,
@@ -90,12 +96,17 @@ class OperationLaws {
   void judge(const Span& span, double until_s);
   void judge_accusation(bool accused, double now_s);
   void note_motion(bool whole, double now_s);
-  [[nodiscard]] bool is_kept(const std::optional<double>& fre_mm) const;
+  /// Empty: the patient is not registered.
+  [[nodiscard]] static std::optional<Found> found_in(const host::OperationView& view);
+  [[nodiscard]] bool is_kept(const Found& found) const;
+  void judge_registration_kept(const host::OperationView& view, double now_s);
+  void judge_calibration_kept(const host::OperationView& view, double now_s);
   [[nodiscard]] bool moves_at(double exposed_s) const;
 
   const OperationTruth& truth_;
   ExposedNs exposed_ns_;
   std::int64_t zero_ns_;
+  bool begins_at_board_;  ///< the appliance has no record: what calibrates is the board
   std::vector<Span> spans_;
   std::optional<wire::Health> before_;
   std::optional<double> ready_since_s_;
@@ -107,11 +118,14 @@ class OperationLaws {
   std::optional<double> unwatched_to_s_;  ///< nothing could show a motion that ended then, and the window has not asked
   std::uint64_t failed_syncs_ = 0;
   std::optional<double> unsaid_since_s_;  ///< a sync failed then, and the window has not said so
-  /// Fiducial registration errors, by which registrations are told apart: of the one that was kept last, and of those
-  /// since. Empty: none was kept, or it may have been taken back.
-  std::vector<double> kept_fre_mm_;
+  /// What was kept last, and what was found since. Empty: nothing was kept, or it may have been taken back.
+  std::vector<Found> kept_;
   bool to_take_up_ = false;                        ///< the window has still to say what it took up
   bool held_back_ = false;                         ///< it has said that it does not use that
+  bool board_kept_ = false;                        ///< a calibration over the board
+  bool board_to_take_up_ = false;                  ///< the window has still to say that it took that up
+  std::optional<double> may_calibrate_since_s_;    ///< all is there for it
+  bool whole_picture_ = false;                     ///< the newest frame has the size that the lens is calibrated at
   std::optional<std::size_t> checks_when_opened_;  ///< of a window that takes up; empty: one was checked since
   Figures figures_;
   std::vector<BrokenLaw> broken_;

@@ -219,8 +219,10 @@ TEST(Operation, ALateDiskDelaysNoPicture) {
   EXPECT_EQ(out.laws.green, quick.laws.green);
 }
 
+/// The window that is opened again takes up the deformation too.
 TEST(OperationWithPictures, ViewsAreKeptAndTheCtIsMatchedWithThem) {
-  const SimulatedOperation operation{.seed = 3, .minutes = 1, .faults = FaultScript{}, .pictures = true};
+  const SimulatedOperation operation{
+      .seed = 3, .minutes = 1, .faults = programs_end({{FaultKind::window_restart, 50, 2.0, {}}}), .pictures = true};
   const OperationOutcome out = operate(operation), again = operate(operation);
   EXPECT_EQ(out.log, again.log);
   EXPECT_EQ(out.hash, again.hash);
@@ -231,9 +233,12 @@ TEST(OperationWithPictures, ViewsAreKeptAndTheCtIsMatchedWithThem) {
   EXPECT_EQ(out.laws.beyond, 0U);
 }
 
+/// The window that is opened again takes up the calibration too.
 TEST(OperationWithPictures, AScopeIsCalibratedOverABoardAndTheOverlayIsAsGoodAsItSays) {
-  const OperationOutcome out =
-      operate({.seed = kSeedAtBoard, .minutes = 1.5, .faults = FaultScript{}, .pictures = true});
+  const OperationOutcome out = operate({.seed = kSeedAtBoard,
+                                        .minutes = 1.5,
+                                        .faults = programs_end({{FaultKind::window_restart, 84, 2.0, {}}}),
+                                        .pictures = true});
   EXPECT_TRUE(out.broken.empty()) << told(out);
   EXPECT_NE(out.log.find("step calibrate"), std::string::npos) << out.log;
   EXPECT_EQ(out.registrations, 1U) << out.log;
