@@ -64,6 +64,11 @@ bool is_covariance(const Eigen::MatrixXd& matrix) {
   return symmetric_eigen(correlation).values.minCoeff() >= -kRounded;
 }
 
+bool is_measured_error(double error) {
+  constexpr double kLargest = 1e4;
+  return error >= 0 && error <= kLargest;
+}
+
 Matrix6d whitening(const Matrix6d& covariance) {
   return Matrix6d(covariance.llt().matrixL()).triangularView<Eigen::Lower>().solve(Matrix6Xd(Matrix6d::Identity()));
 }

@@ -42,6 +42,9 @@ Eigen::MatrixXd inverse_information(const Eigen::MatrixXd& information);
 /// direction. What has no variance, as a parameter that was held, goes with nothing either.
 bool is_covariance(const Eigen::MatrixXd& matrix);
 
+/// Whether a measurement can have such an error, in mm, px or ms: nothing is calibrated beyond 10,000.
+bool is_measured_error(double error);
+
 /// W with W^T W = covariance^-1: brings what has this covariance to one of unit variances.
 Matrix6d whitening(const Matrix6d& covariance);
 

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "calibration/base/nesting.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/record/checksum.hpp"
 #include "calibration/record/field_map_json.hpp"
 #include "calibration/record/sha256.hpp"
@@ -16,7 +17,6 @@ namespace birdseye::calibration {
 namespace {
 
 constexpr int kVersion = 1;
-constexpr double kLargestError_mm = 1e4;
 
 std::optional<Grade> grade_of(const std::string& name) {
   for (const Grade grade : {Grade::pass, Grade::marginal}) {
@@ -35,7 +35,7 @@ Result<FieldMapFile> map_of(const nlohmann::json& json) {
   json.at("software").get_to(notes.software);
   json.at("made_from").get_to(notes.made_from);
   json.at("held_out_mm").get_to(notes.held_out_mm);
-  if (!(notes.held_out_mm >= 0 && notes.held_out_mm <= kLargestError_mm))
+  if (!is_measured_error(notes.held_out_mm))
     return no_map(fmt::format("for its held_out_mm is {:g}, which no measurement gives", notes.held_out_mm));
   if (json.contains("tracker")) json.at("tracker").get_to(notes.tracker);
   const auto grade = grade_of(json.at("verdict").get<std::string>());

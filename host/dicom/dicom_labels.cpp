@@ -30,9 +30,9 @@ struct LabelFrame {
 /// How the pixels of all frames are to be taken.
 struct LabelPixels {
   int columns = 0, rows = 0;
-  int bits = 8;                   ///< of a pixel: 1, 8 or 16
-  int at_least = 1;               ///< for the pixel to belong to the frame's segment
-  std::optional<int> background;  ///< of a label map, where the file says which number it has
+  int bits = 8;        ///< of a pixel: 1, 8 or 16
+  int at_least = 1;    ///< for the pixel to belong to the frame's segment
+  int background = 0;  ///< of a label map
   std::vector<std::uint8_t> bytes;
 
   [[nodiscard]] std::size_t per_frame() const {
@@ -253,13 +253,14 @@ std::string lay_frames(const std::vector<LabelFrame>& frames, const std::vector<
     std::int16_t* const slice = out.labels.data() + static_cast<std::size_t>(slice_of[f]) * plane;
     for (std::size_t i = 0; i < plane; ++i) {
       const int pixel = pixels.at(f * plane + i);
+      const bool by_pixel = frames[f].segment == 0;
       if (pixel < pixels.at_least) continue;
-      if (frames[f].segment == 0 && is_segment[static_cast<std::size_t>(pixel)] == 0) {
+      if (by_pixel && is_segment[static_cast<std::size_t>(pixel)] == 0) {
         if (pixel == pixels.background) continue;
         return fmt::format("has a voxel of segment {}, which is none of its segments (0062,0002); export it again",
                            pixel);
       }
-      const auto value = values.with(slice[i], frames[f].segment == 0 ? pixel : frames[f].segment);
+      const auto value = values.with(slice[i], by_pixel ? pixel : frames[f].segment);
       if (!value || *value > kHighestLabel) return "has too many segments that share voxels; export fewer of them";
       slice[i] = static_cast<std::int16_t>(*value);
     }
@@ -298,7 +299,14 @@ Result<DicomLabels> read_dicom_labels(const fs::path& path) {
     return refused(Errc::unsupported, path, "has more voxels than any CT; export it on the grid of the CT");
   if (type == "FRACTIONAL")
     pixels.at_least = std::max(1, (integer_of(dataset, DCM_MaximumFractionalValue).value_or(255) + 1) / 2);
-  if (by_pixels) pixels.background = integer_of(dataset, DCM_PixelPaddingValue);
+  if (by_pixels) pixels.background = integer_of(dataset, DCM_PixelPaddingValue).value_or(0);
+  // Voxels of labels that are 0 are of no structure.
+  if (pixels.background != 0 && std::ranges::any_of(out.names, [](const auto& label) { return label.number == 0; })) {
+    return refused(Errc::unsupported, path,
+                   fmt::format("has a segment of the number 0 beside a background of {} (0028,0120); number its "
+                               "segments from 1, and export it again",
+                               pixels.background));
+  }
   wrong = lay_frames(frames, slice_of, pixels, out);
   if (!wrong.empty()) return refused(Errc::bad_format, path, wrong);
   return out;

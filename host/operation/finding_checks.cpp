@@ -11,10 +11,8 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr double kLargestFigure = 1e4;  // in mm or px: nothing is seen from there
-
 Result<void> check_figure(const char* name, const std::optional<double>& figure) {
-  if (!figure || (*figure >= 0 && *figure <= kLargestFigure)) return {};
+  if (!figure || is_measured_error(*figure)) return {};
   return Error{Errc::bad_value, fmt::format("{} is {:g}, which no measurement gives", name, *figure)};
 }
 

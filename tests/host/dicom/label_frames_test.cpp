@@ -77,6 +77,14 @@ TEST(DicomSegFrames, OfALabelMapTheBackgroundMayBeASegment) {
   for (auto& frame : seg.frames) frame.segment = 0;
   EXPECT_EQ(said_of(seg, second_segment("0")), "");
   expect_said(said_of(seg, second_segment("-1")), "has a segment of the number '-1'");
+  const auto padded = [](int with) {
+    return [with, zero = second_segment("0")](DcmDataset& dataset) {
+      zero(dataset);
+      put(dataset, DCM_PixelPaddingValue, with);
+    };
+  };
+  EXPECT_EQ(said_of(seg, padded(0)), "");
+  expect_said(said_of(seg, padded(255)), "has a segment of the number 0 beside a background of 255 (0028,0120)");
 }
 
 TEST(DicomSegFrames, OfALabelMapEachVoxelIsOfASegmentThatTheFileHas) {
