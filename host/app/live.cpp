@@ -265,6 +265,7 @@ Result<ExitCode> run(LiveOptions& options) {
               std::move(publisher));
   app.begin_with(options.look, options.light_room ? Room::light : Room::dark, options.identify);
   const auto ran = app.run(asked);
+  app.finish();
   nlohmann::json json = json_of(app.figures(), app.operation());
   Verdict verdict;
   if (!ran) verdict.add(Grade::fail, ran.error().what);

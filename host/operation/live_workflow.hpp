@@ -58,6 +58,8 @@ class LiveWorkflow {
   void take(const CheckedSurface& checked);
   /// Collects what threads have finished.
   void tick();
+  /// The last: waits until what was found is kept, or cannot be, which the view's fault says.
+  void finish() { keeper_.finish(); }
   /// The link to the appliance came or went; may_retry as ConnectionStep has it.
   void set_link(bool connected, const std::string& words, bool may_retry = false);
   /// What only a simulated cart can tell without being asked.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 #include "host/texts/texts.hpp"
 
 namespace birdseye::host {
@@ -35,7 +36,22 @@ Result<std::optional<Operation>> OperationKeeper::take_up(const std::string& ct_
 }
 
 OperationKeeper::~OperationKeeper() {
-  if (newest_ != written_) write();
+  finish();
+}
+
+void OperationKeeper::finish() {
+  constexpr Duration kLook = Duration::from_ms(5);
+  if (std::exchange(finished_, true)) return;
+  const auto wait = [this] {
+    const Deadline deadline = Deadline::after(Background<Result<void>>::kEndsWithin);
+    while (writing_.running() && !deadline.passed()) sleep_for(kLook);
+    if (writing_.running()) fault_ = words("note_not_kept", fmt::format("{}: the disk does not answer", out_.string()));
+    if (!writing_.running()) hear();
+    return !writing_.running();
+  };
+  if (!wait() || (newest_ == written_ && !again_)) return;
+  write();
+  wait();
 }
 
 void OperationKeeper::keep(Operation operation) {
@@ -53,15 +69,19 @@ void OperationKeeper::write() {
   });
 }
 
-void OperationKeeper::tick() {
+void OperationKeeper::hear() {
   constexpr Duration kAgainAfter = Duration::from_ms(5000);
+  const auto written = writing_.take();
+  if (!written) return;
+  fault_ = *written ? "" : words("note_not_kept", written->error().what);
+  if (!*written) again_ = Deadline::after(kAgainAfter);
+}
+
+void OperationKeeper::tick() {
   // What is being written ends first: what became of it would be lost otherwise, and a disk that is full and slow would
   // not be told of where something new is found again and again.
   if (writing_.running()) return;
-  if (const auto written = writing_.take()) {
-    fault_ = *written ? "" : words("note_not_kept", written->error().what);
-    if (!*written) again_ = Deadline::after(kAgainAfter);
-  }
+  hear();
   if (newest_ != written_ || (again_ && again_->passed())) write();
 }
 

@@ -12,7 +12,7 @@
 namespace birdseye::host {
 
 /// Keeps what an operation has found in a folder, and takes up what an earlier window kept. It writes on a thread of
-/// its own, for a disk may take its time; its end waits until all is written.
+/// its own, for a disk may take its time; its end waits until all is written, or the disk has failed again.
 class OperationKeeper {
  public:
   /// out: where to; empty: nowhere. resume: what is to be taken up, if authors
@@ -30,12 +30,15 @@ class OperationKeeper {
   /// Hears what became of each that was written, and begins the next. What could not be kept is written again every
   /// five seconds.
   void tick();
+  /// Waits until all is written, or the disk has failed once more: which of them, fault() says.
+  void finish();
   [[nodiscard]] bool writing() const { return writing_.running() || newest_ != written_; }
   /// Why it could not be kept.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 
  private:
   void write();
+  void hear();
 
   std::filesystem::path out_, resume_;
   Authors authors_;
@@ -44,6 +47,7 @@ class OperationKeeper {
   std::shared_ptr<const Operation> written_;  ///< whose writing was begun last
   std::optional<Deadline> again_;             ///< once what could not be kept is written again
   std::string fault_;
+  bool finished_ = false;
 };
 
 }  // namespace birdseye::host

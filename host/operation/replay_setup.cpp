@@ -160,6 +160,11 @@ Result<void> take_registration(const ReplayInputs& inputs, const std::optional<C
     if (read->ct_sha256.empty()) out.cautions.emplace_back(words("why_registration_of_no_ct"));
     out.by_file = *std::move(read);
   } else {
+    if (inputs.tracker_from_patient.filename().string().find("patient_from_tracker") != std::string::npos) {
+      return Error{Errc::bad_value, fmt::format("{}: by its name it is the inverse of what is asked for; give it as "
+                                                "--registration",
+                                                inputs.tracker_from_patient.string())};
+    }
     const auto read = read_transform<Tracker, Patient>(inputs.tracker_from_patient);
     if (!read) return read.error();
     out.tracker_from_patient = *read;

@@ -45,6 +45,8 @@ class LiveApp {
   /// Until the window is closed, the program is interrupted or the script ends.
   /// asked: when the program was started.
   Result<void> run(HostTime asked);
+  /// After it: waits until what was found is kept, or cannot be, which the operation's fault says.
+  void finish() { workflow_.finish(); }
   [[nodiscard]] const LiveFigures& figures() const { return figures_; }
   /// How the operation stands, and what its overlay is drawn by.
   [[nodiscard]] OperationView operation() const { return workflow_.view(); }

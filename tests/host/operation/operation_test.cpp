@@ -359,6 +359,43 @@ TEST(OperationKeeper, SaysWhatCannotBeKept) {
   EXPECT_NE(keeper.fault().find("operation.json"), std::string::npos) << keeper.fault();
 }
 
+/// A disk that has room again takes what it did not before, and one that has none is told.
+TEST(OperationKeeper, AtItsEndWritesOnceMoreWhatCouldNotBeKept) {
+  const Scratch scratch;
+  const auto folder = scratch / "out";
+  (void)scratch.file("out", "");  // a file where the folder should be
+  OperationKeeper keeper(folder, {}, testing::authors()), other(folder, {}, testing::authors());
+  for (OperationKeeper* const one : {&keeper, &other}) {
+    one->keep(whole_operation());
+    wait_for(*one);
+    one->tick();
+    EXPECT_NE(one->fault(), "");
+  }
+  other.keep(whole_operation());
+  other.finish();
+  EXPECT_NE(other.fault().find("operation.json"), std::string::npos) << other.fault();
+  std::filesystem::remove(folder);
+  std::filesystem::create_directory(folder);
+  keeper.finish();
+  EXPECT_EQ(keeper.fault(), "");
+  EXPECT_TRUE(read_operation(folder));
+}
+
+TEST(OperationKeeper, WhatWasFoundLastIsKeptBehindAWriteThatRuns) {
+  const Scratch scratch;
+  Operation last = whole_operation();
+  last.registered->fre_mm = 0.2;
+  {
+    OperationKeeper keeper(scratch.path(), {}, testing::authors());
+    for (int i = 0; i < 20; ++i) keeper.keep(whole_operation());
+    keeper.keep(last);
+    EXPECT_TRUE(keeper.writing());
+  }
+  const auto read = read_operation(scratch.path());
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->registered->fre_mm, 0.2);
+}
+
 /// A figure that is not known is none in the files either.
 TEST(OperationKeeper, AFigureThatIsNotKnownStaysUnknown) {
   const Scratch scratch;
