@@ -58,6 +58,12 @@ Result<RegistrationFile> read_registration(const fs::path& path) {
   if (!matrix) return matrix.error();
   RegistrationFile out{Transform<Patient, Tracker>::from_matrix(*matrix)};
   const bool sealed = text.starts_with(kTitle) || text.find(kSum) != std::string::npos;
+  // What is not sealed does not show which way it goes.
+  if (!sealed && path.filename().string().find("tracker_from_patient") != std::string::npos) {
+    return Error{Errc::bad_value, fmt::format("{}: by its name it is the inverse of what is asked for; give a "
+                                              "patient_from_tracker.txt, which register fiducials and replay write",
+                                              path.string())};
+  }
   if (!sealed) return out;
   const auto refused = [&path](const Error& why) {
     return Error{Errc::bad_format, fmt::format("{}: {}; register again, or give a copy that is as it was written",

@@ -183,6 +183,8 @@ TEST(ReplayCommand, WhatCannotBeReplayedIsRefused) {
   refused(all, {"give one registration"});
   refused(all + registration + " --tracker-from-patient " + scratch.file("t.txt", kIdentityPose),
           {"give one registration"});
+  refused(all + " --tracker-from-patient " + scratch.file("patient_from_tracker.txt", kIdentityPose),
+          {"patient_from_tracker.txt", "by its name it is the inverse", "--registration"});
   refused("replay " + (scratch / "r").string() + " --volume " + ct + registration, {"no calibration was in force"});
   refused("replay " + (scratch / "none").string() + " --volume " + ct + registration, {"none", "no such recording"});
   refused("replay " + ct + " --volume " + ct + registration, {"holds no recording"});

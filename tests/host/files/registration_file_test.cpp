@@ -43,6 +43,15 @@ TEST(RegistrationFile, APlainMatrixSaysNothingOfItself) {
   EXPECT_TRUE(check_ct(*read, std::string(64, 'b')));
 }
 
+TEST(RegistrationFile, APlainMatrixThatIsTheInverseByItsNameIsRefused) {
+  const Scratch scratch;
+  const std::string matrix = "1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n";
+  const auto inverse = read_registration(scratch.file("tracker_from_patient.txt", matrix));
+  ASSERT_FALSE(inverse);
+  EXPECT_NE(inverse.error().what.find("by its name it is the inverse"), std::string::npos) << inverse.error().what;
+  EXPECT_TRUE(read_registration(scratch.file("patient_from_tracker.txt", matrix)));
+}
+
 TEST(RegistrationFile, NotOneCharacterMayBeChanged) {
   const Scratch scratch;
   const std::string text = registration_text(example());
