@@ -52,18 +52,18 @@ Matrix covariance_of(const Json& rows) {
   return matrix;
 }
 
-constexpr double kLargestFigure = 1e4;  // mm, px and ms alike: beyond it nothing is calibrated
-
 /// An error that was measured, so none below zero.
 void read_error_figure(const Json& json, const char* name, double& figure) {
   json.at(name).get_to(figure);
-  if (!(figure >= 0 && figure <= kLargestFigure))
+  if (!is_measured_error(figure))
     throw std::range_error(fmt::format("{} is {:g}, which no measurement gives", name, figure));
 }
 
 Json json_of(const Provenance& p) {
-  return {
+  Json json = {
       {"made_utc", p.made_utc}, {"software", p.software}, {"made_from", p.made_from}, {"verdict", name_of(p.grade)}};
+  if (!p.doubt.empty()) json["rests_on"] = {{"unsigned", p.doubt}};
+  return json;
 }
 Provenance provenance_of(const Json& json) {
   Provenance p;
@@ -74,6 +74,7 @@ Provenance provenance_of(const Json& json) {
   if (verdict != name_of(Grade::pass) && verdict != name_of(Grade::marginal))
     throw std::range_error("a result whose verdict is \"" + verdict + "\"");
   p.grade = verdict == name_of(Grade::pass) ? Grade::pass : Grade::marginal;
+  if (json.contains("rests_on")) json.at("rests_on").at("unsigned").get_to(p.doubt);
   return p;
 }
 
@@ -199,7 +200,8 @@ LatencyEntry latency_of(const Json& json) {
   std::tie(latency.ci95_low_ms, latency.ci95_high_ms) = json.at("offset_ci95_ms").get<std::pair<double, double>>();
   json.at("drift_ppm").get_to(latency.drift_ppm);
   if (!(latency.ci95_low_ms <= latency.ci95_high_ms) ||
-      std::max({std::abs(latency.offset_ms), -latency.ci95_low_ms, latency.ci95_high_ms}) > kLargestFigure)
+      !is_measured_error(
+          std::max({std::abs(latency.offset_ms), std::abs(latency.ci95_low_ms), std::abs(latency.ci95_high_ms)})))
     throw std::range_error("offset_ms or offset_ci95_ms is what no measurement gives");
   return latency;
 }
@@ -239,6 +241,17 @@ bool CalibrationRecord::set_lens(LensEntry entry) {
   if (!other || !hand_eye) return false;
   hand_eye.reset();
   return true;
+}
+
+std::string doubt_of(const CalibrationRecord& record) {
+  const auto in = [](const char* name, const auto& entry) {
+    return entry && !entry->provenance.doubt.empty() ? fmt::format("its {}: {}", name, entry->provenance.doubt) : "";
+  };
+  for (std::string doubt : {in("lens", record.lens), in("hand-eye", record.hand_eye), in("tip", record.tip),
+                            in("latency", record.latency)}) {
+    if (!doubt.empty()) return doubt;
+  }
+  return {};
 }
 
 std::string record_text(const CalibrationRecord& record) {

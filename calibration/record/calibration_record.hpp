@@ -20,6 +20,7 @@ struct Provenance {
   std::string software;       ///< birdseye and its version
   std::string made_from;      ///< the board and how many views, in words
   Grade grade = Grade::pass;  ///< pass or marginal: what failed is not put into a record
+  std::string doubt{};        ///< that it rests on what no known machine signed, and on what; empty: on nothing such
 };
 
 struct LensEntry {
@@ -81,6 +82,9 @@ struct CalibrationRecord {
   /// it; the answer is true if it did.
   bool set_lens(LensEntry entry);
 };
+
+/// Of the first entry that rests on what no known machine signed: which entry, and on what. Empty: none does.
+std::string doubt_of(const CalibrationRecord& record);
 
 /// Signed by nobody.
 std::string record_text(const CalibrationRecord& record);

@@ -225,7 +225,8 @@ std::string why_unread(const std::string& path, const Error& error) {
 /// A file of [calibration] that a machine signs.
 struct SignedFile {
   const std::string& path;
-  const char* what;  ///< "record"
+  const char* what;   ///< "record"
+  const char* again;  ///< how to get one that is signed
   const char* kind;
   const std::string& sha256;
   const std::optional<calibration::FileSignature>& signature;
@@ -247,17 +248,13 @@ Result<Unsigned> unsigned_by(const SignedFile& file) {
   const ThisMachine machine = opened ? *std::move(opened) : ThisMachine::for_once();
   const auto author = machine.author_of(file.kind, file.sha256, file.signature);
   if (!author) return author.error();
-  if (!why_closed.empty()) {
-    const std::string untold = "by whom cannot be told: " + why_closed;
-    return Unsigned{untold, fmt::format("{}: the {} is {}", path, file.what, untold)};
-  }
-  if (author->standing == Author::Standing::known) return Unsigned();
-  Unsigned out{author->words(), {}};
-  out.refusal = fmt::format("{}: the {} is {}; [calibration] accept_unsigned = true uses it all the same", path,
-                            file.what, out.who);
-  if (author->standing == Author::Standing::unknown) {
-    out.refusal += fmt::format("; to know that machine, add the line \"NAME {}\" to {}", author->key.hex(),
-                               (*folder / "known").string());
+  if (why_closed.empty() && author->standing == Author::Standing::known) return Unsigned();
+  Unsigned out{why_closed.empty() ? author->words() : "of an author who cannot be told: " + why_closed, {}};
+  out.refusal = fmt::format("{}: the {} is {}; {}, or use it all the same by [calibration] accept_unsigned = true",
+                            path, file.what, out.who, file.again);
+  if (why_closed.empty() && author->standing == Author::Standing::unknown) {
+    out.refusal += fmt::format("; to know that machine, add the line \"NAME {}\" to {} and reload birdseyed",
+                               author->key.hex(), (*folder / "known").string());
   }
   return out;
 }
@@ -267,7 +264,8 @@ void read_field_map(const std::string& path, bool accept_unsigned, ConfigSection
   if (!text) return section.fail("field", why_unread(path, text.error()));
   auto read = calibration::parse_field_map(*text);
   if (!read) return section.fail("field", read.error().with_context(path).what);
-  auto unknown = unsigned_by({path, "map of the field", calibration::kFieldMapFormat, read->sha256, read->signature});
+  auto unknown = unsigned_by({path, "map of the field", "make one that is signed by birdseye calibrate field",
+                              calibration::kFieldMapFormat, read->sha256, read->signature});
   if (!unknown) return section.fail("field", unknown.error().with_context(path).what);
   CoreSettings& core = config.core;
   core.field = std::move(read->map);
@@ -288,10 +286,19 @@ void read_calibration_record(const std::string& path, bool accept_unsigned, Conf
   if (!text) return section.fail("record", why_unread(path, text.error()));
   const auto record = calibration::parse_signed_record(*text);
   if (!record) return section.fail("record", record.error().with_context(path).what);
-  auto unknown = unsigned_by({path, "record", calibration::kRecordFormat, record->sha256, record->signature});
+  auto unknown = unsigned_by({path, "record", "make one that is signed by birdseye calibrate",
+                              calibration::kRecordFormat, record->sha256, record->signature});
   if (!unknown) return section.fail("record", unknown.error().with_context(path).what);
   config.core.calibration = *text;
-  if (!accept_unsigned) config.core.calibration_refused = std::move(unknown->refusal);
+  if (accept_unsigned) return;
+  config.core.calibration_refused = std::move(unknown->refusal);
+  if (const std::string doubt = calibration::doubt_of(record->record);
+      config.core.calibration_refused.empty() && !doubt.empty()) {
+    config.core.calibration_refused = fmt::format(
+        "{}: the record rests on what no known machine signed ({}); calibrate again by what is signed, or use it all "
+        "the same by [calibration] accept_unsigned = true",
+        path, doubt);
+  }
 }
 
 void read_calibration(ConfigSection& section, Config& config) {

@@ -15,6 +15,7 @@
 #include "device/birdseyed/service.hpp"
 #include "device/birdseyed/wire_admission.hpp"
 #include "device/wire/pairing.hpp"
+#include "device/wire/tcp_link.hpp"
 #include "drivers/identity/identity_folder.hpp"
 #include "drivers/system/program.hpp"
 #include "drivers/system/service_signals.hpp"
@@ -109,6 +110,11 @@ struct PairOptions {
 int pair(const fs::path& path, const PairOptions& options) {
   const auto config = device::read_config(path);
   if (!config) return refuse(config.error());
+  if (wire::is_loopback(config->wire.bind)) {
+    print_error("birdseyed", fmt::format("pair: [wire] bind is {}, which no other machine reaches: set it to this "
+                                         "machine's address on its network, or 0.0.0.0",
+                                         config->wire.bind));
+  }
   const auto folder = identity_folder();
   if (!folder) return refuse(folder.error());
   const auto paired = wire::pair_as_server({*folder, options.name, wire::ask_people}, config->wire.bind, options.port,
@@ -171,7 +177,12 @@ int main(int argc, char** argv) {
       for (const std::string& refused : {config->core.calibration_refused, config->core.field_refused}) {
         if (!refused.empty()) print_error("birdseyed", refused);
       }
-      fmt::print("{}: sound\n", config_path.string());
+      if (const std::string& who = config->core.field_unsigned; !who.empty())
+        print_error("birdseyed", fmt::format("UNSIGNED: the map of the field is {}", who));
+      const char* without = !config->core.field_refused.empty()         ? ", but no pose will be published"
+                            : !config->core.calibration_refused.empty() ? ", but the record will not be used"
+                                                                        : "";
+      fmt::print("{}: sound{}\n", config_path.string(), without);
       if (const std::string who = device::admission_words(config->wire); !who.empty()) fmt::print("{}\n", who);
       return 0;
     }

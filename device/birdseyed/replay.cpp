@@ -26,15 +26,19 @@ Result<void> admit_replay(const std::filesystem::path& recording, bool accept_un
                           ? machine->author_of(calibration::kApplianceRecordingFormat, seal->sha256, seal->signature)
                           : Result<Author>(Author());
   if (!author) return refused(author.error().what);
-  if (author->standing == Author::Standing::known) return {};
-  if (!accept_unsigned) return refused(fmt::format("is {}; --accept-unsigned plays it all the same", author->words()));
-  spdlog::warn("UNSIGNED: {} is {}", recording.string(), author->words());
+  std::string doubt = author->standing == Author::Standing::known ? "" : "is " + author->words();
+  if (doubt.empty() && !seal->rests_on.empty())
+    doubt = fmt::format("rests on what no known machine signed ({})", seal->rests_on);
+  if (doubt.empty()) return {};
+  if (!accept_unsigned) return refused(doubt + "; --accept-unsigned plays it all the same");
+  spdlog::warn("UNSIGNED: {} {}", recording.string(), doubt);
   return {};
 }
 
 namespace {
 
 // birdseyed records what it does several times a second.
+constexpr Duration kHealthEvery = Duration::from_ms(1000);
 constexpr Duration kLongWait = Duration::from_ms(10'000), kLongestWait = Duration::from_ms(3'600'000);
 
 }  // namespace
@@ -44,6 +48,7 @@ Result<void> replay(const std::filesystem::path& recording, wire::Server& server
   if (!reader) return reader.error();
   Core core(reader->settings());
   std::optional<Duration> shift;  // from the recording's clock to this one
+  Deadline health_due = Deadline::after(Duration());
   while (!stop.stop_requested()) {
     auto event = reader->next();
     if (!event) return event.error();
@@ -59,6 +64,14 @@ Result<void> replay(const std::filesystem::path& recording, wire::Server& server
     if (wait > kLongWait)
       spdlog::warn("{}: nothing was recorded for the next {:.0f} s: waiting", recording.string(), wait.seconds());
     sleep_for(wait, stop);
+    // An appliance tells its clients by its health, of which nothing is recorded.
+    if (const std::string& doubt = reader->settings().field_unsigned; !doubt.empty() && health_due.passed()) {
+      wire::Health health;
+      health.state = "ready";
+      health.field_unsigned = doubt;
+      server.publish(wire::pack(health, device_now()));
+      health_due = Deadline::after(kHealthEvery);
+    }
     for (const wire::Packet& packet : core.take(**event)) server.publish(packet);
   }
   if (reader->cut_short()) spdlog::warn("{}: ends inside a block, as after a power cut", recording.string());

@@ -9,11 +9,13 @@
 namespace birdseye::device {
 
 /// Refuses a recording that was changed since it was signed, and, unless it is to be accepted all the same, one that is
-/// not signed or by a machine that is not known here.
+/// not signed, or by a machine that is not known here, and one whose poses rest on a map that no known machine had
+/// signed.
 Result<void> admit_replay(const std::filesystem::path& recording, bool accept_unsigned);
 
 /// Publishes again, byte for byte and at the pace of the events, what the appliance said during a recording. Where the
-/// recording is damaged: an error, after all that is sound was published.
+/// recording is damaged: an error, after all that is sound was published. Where its poses rest on a map that no known
+/// machine had signed, health says so once a second, and nothing else.
 Result<void> replay(const std::filesystem::path& recording, wire::Server& server, const std::stop_token& stop);
 
 }  // namespace birdseye::device

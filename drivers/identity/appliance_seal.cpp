@@ -16,13 +16,14 @@
 
 #include "calibration/base/crc64.hpp"
 #include "calibration/record/sha256.hpp"
+#include "calibration/record/strict_json.hpp"
 
 namespace birdseye {
 
 namespace {
 
 constexpr std::string_view kMagic = "BEREC002";
-constexpr std::uint32_t kSignatureBlock = 7;
+constexpr std::uint32_t kSettingsBlock = 1, kSignatureBlock = 7;
 constexpr std::size_t kHeadBytes = 12, kSumBytes = 8;  // kind and size before a payload, its sum behind it
 constexpr std::uint64_t kMostPayload = 64U << 20U;
 
@@ -49,6 +50,14 @@ bool sum_fits(std::span<const char> head, std::span<const char> payload_and_sum)
   std::uint64_t sum = 0;
   std::memcpy(&sum, payload_and_sum.last(kSumBytes).data(), kSumBytes);
   return sum == ~crc64_ecma(as_bytes(payload), crc64_ecma(as_bytes(head), ~std::uint64_t{0}));
+}
+
+/// What birdseyed wrote of its map of the field among its settings, where no known machine had signed that.
+std::string rests_on(std::span<const char> settings) {
+  const auto json = calibration::strict_json<nlohmann::json>({settings.begin(), settings.end()});
+  const auto field = json.is_object() ? json.find("field_unsigned") : json.end();
+  if (field == json.end() || !field->is_string()) return {};
+  return fmt::format("its map of the field is {}", field->get<std::string>());
 }
 
 /// Whether a signature stands at a file's end, whatever its block says of itself: damage to the kind or the size of a
@@ -88,6 +97,7 @@ Result<ApplianceSeal> read_appliance_seal(const std::filesystem::path& path) {
   calibration::Sha256 sum;
   sum.add(as_bytes(kMagic));
   std::vector<char> bytes;
+  std::string doubt;
   for (;;) {
     std::array<char, kHeadBytes> head_bytes{};
     in.read(head_bytes.data(), head_bytes.size());
@@ -98,15 +108,16 @@ Result<ApplianceSeal> read_appliance_seal(const std::filesystem::path& path) {
     in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     if (!whole || static_cast<std::size_t>(in.gcount()) != bytes.size()) {
       if (ends_in_a_signature(in)) return refused(kDamagedSignature);
-      return ApplianceSeal{sum.hex(), {}};
+      return ApplianceSeal{sum.hex(), {}, false, doubt};
     }
+    if (head.kind == kSettingsBlock) doubt = rests_on(std::span(bytes).first(head.size));
     if (head.kind != kSignatureBlock) {
       sum.add(as_bytes(head_bytes));
       sum.add(as_bytes(bytes));
       continue;
     }
     if (!sum_fits(head_bytes, bytes)) return refused(kDamagedSignature);
-    ApplianceSeal out{sum.hex(), calibration::FileSignature(), in.peek() != std::char_traits<char>::eof()};
+    ApplianceSeal out{sum.hex(), calibration::FileSignature(), in.peek() != std::char_traits<char>::eof(), doubt};
     try {
       out.signature = calibration::signature_of_json(
           nlohmann::json::parse(bytes.begin(), bytes.end() - static_cast<std::ptrdiff_t>(kSumBytes)));

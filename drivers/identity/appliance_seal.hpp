@@ -14,6 +14,7 @@ struct ApplianceSeal {
   std::string sha256;                                   ///< of all bytes before the signature
   std::optional<calibration::FileSignature> signature;  ///< empty: nobody, as of one that was cut short
   bool more = false;                                    ///< something stands behind the signature
+  std::string rests_on{};  ///< what its poses rest on that no known machine had signed; empty: on nothing such
 };
 
 bool is_appliance_recording(const std::filesystem::path& path);

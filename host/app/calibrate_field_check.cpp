@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
 
-#include "calibration/record/field_map_file.hpp"
 #include "drivers/system/clock.hpp"
 #include "host/app/results.hpp"
 #include "host/calibrate/field_pictures.hpp"
@@ -19,26 +21,30 @@ namespace {
 using calibration::CheckedPlace;
 using calibration::FieldCheck;
 
+constexpr std::size_t kDateLength = std::string_view("2026-11-29").size();
+
 struct CalibrateFieldCheckOptions {
   std::filesystem::path plate, measured, history, field;
   std::string when;
   ResultPaths results;
 };
 
-Result<std::vector<CheckedPlace>> places_of(const CalibrateFieldCheckOptions& options) {
+/// The map that corrects the places. The day is checked also by one that nobody known signed, which the verdict says.
+Result<AdmittedField> field_of(const CalibrateFieldCheckOptions& options) {
+  if (options.field.empty()) return AdmittedField();
+  const auto authors = Authors::of_this_machine(true);
+  if (authors) return read_field_map(options.field, *authors);
+  auto read = read_field_map(options.field);  // without a key of its own a machine knows nobody
+  if (!read) return read.error();
+  return AdmittedField{std::move(read->map), "of an author who cannot be told: " + authors.error().what};
+}
+
+Result<std::vector<CheckedPlace>> places_of(const CalibrateFieldCheckOptions& options,
+                                            const std::optional<calibration::FieldMap>& map) {
   const auto plate = read_places(options.plate);
   if (!plate) return plate.error();
   auto measured = read_places(options.measured);
   if (!measured) return measured.error();
-  std::optional<calibration::FieldMap> map;
-  if (!options.field.empty()) {
-    auto read = read_field_map(options.field);
-    if (!read) return read.error();
-    if (auto noted = note_author(options.field.string(), calibration::kFieldMapFormat, read->sha256, read->signature);
-        !noted)
-      return noted.error();
-    map = std::move(read->map);
-  }
   std::vector<CheckedPlace> out;
   for (const auto& [name, place] : *measured) {
     const auto known =
@@ -100,7 +106,9 @@ HtmlPage page_of(const FieldCheck& check, const std::vector<CheckedPlace>& place
 void run(const CalibrateFieldCheckOptions& options, CommandStatus& status) {
   auto history = read_history(options.history);
   if (!history) return status.refuse(history.error());
-  const auto places = places_of(options);
+  const auto field = field_of(options);
+  if (!field) return status.refuse(field.error());
+  const auto places = places_of(options, field->map);
   if (!places) return status.refuse(places.error());
   const std::string when = options.when.empty() ? local_time_now() : options.when;
   const auto known = std::ranges::find_if(*history, [&](const FieldCheck& day) { return day.when == day_name(when); });
@@ -109,14 +117,20 @@ void run(const CalibrateFieldCheckOptions& options, CommandStatus& status) {
                                                        "line out",
                                                        options.history.string(), known->when)});
   }
+  // Places that are touched again are no other day.
+  const auto is_today = [&when](const FieldCheck& day) { return day.when.starts_with(when.substr(0, kDateLength)); };
+  if (options.when.empty() && std::erase_if(*history, is_today) > 0)
+    fmt::print("in {} this check replaces today's former\n", options.history.string());
   const auto check = calibration::check_field(when, *places);
   if (!check) return status.refuse(check.error().with_context(options.measured.string()));
   history->push_back(*check);
   // A bad day belongs into the history like any other; the file is replaced as a whole.
   if (const auto written = write_file(options.history, history_text(*history)); !written)
     return status.refuse(written.error());
+  Verdict verdict = calibration::verdict_of(*history);
+  tell_doubts({}, *field, verdict);
   finish_calibration(options.results, "", json_of(*check, *places, *history), page_of(*check, *places, *history),
-                     calibration::verdict_of(*history), status);
+                     verdict, status);
 }
 
 }  // namespace

@@ -206,7 +206,7 @@ Result<HandEyeRecording> record_live(const CalibrateHandEyeOptions& options, con
 
 /// Hand-eye, and the lens it was found with where that is new.
 RecordEntry entry_of(const CalibrateHandEyeOptions& options, const HandEyeRecording& recording,
-                     const HandEyeFound& found) {
+                     const HandEyeFound& found, const std::string& doubt) {
   const HandEyeFiles& files = options.files;
   std::string what = !files.board.empty()    ? files.board
                      : !files.points.empty() ? files.points.filename().string()
@@ -228,11 +228,12 @@ RecordEntry entry_of(const CalibrateHandEyeOptions& options, const HandEyeRecord
               record.hand_eye->rod = calibration::RodEntry{found.rod->at_reference().angle_deg, rod.axis_in_sensor,
                                                            rod.axis_point_in_sensor_mm, rod.picture_turn};
             }
-          }};
+          },
+          doubt};
 }
 
 void finish(const CalibrateHandEyeOptions& options, const HandEyeRecording& recording, const HandEyeFound& found,
-            CommandStatus& status) {
+            const std::string& doubt, CommandStatus& status) {
   const calibration::HandEyeResult& result = found.result;
   for (const std::string& note : recording.notes) print_line(note);
   if (recording.stream_correlation > 0 && result.solved) {
@@ -248,7 +249,8 @@ void finish(const CalibrateHandEyeOptions& options, const HandEyeRecording& reco
     add_rod_to(page, *found.rod);
   }
   finish_calibration(options.results, result.solved ? pose_text(result.camera_from_sensor.matrix()) : "",
-                     std::move(json), std::move(page), found.verdict, status, entry_of(options, recording, found));
+                     std::move(json), std::move(page), found.verdict, status,
+                     entry_of(options, recording, found, doubt));
 }
 
 void run(const CLI::App& command, CalibrateHandEyeOptions& options, CommandStatus& status) {
@@ -287,8 +289,8 @@ void run(const CLI::App& command, CalibrateHandEyeOptions& options, CommandStatu
   recording->eye_inverted = files.of_eye.inverted;
   auto found = solve_hand_eye(*recording, angles, !files.eye_poses.empty());
   if (!found) return status.refuse(found.error());
-  tell_doubts(*source, *field, found->verdict);
-  finish(options, *recording, *found, status);
+  const std::string doubt = tell_doubts(*source, *field, found->verdict);
+  finish(options, *recording, *found, doubt, status);
 }
 
 }  // namespace

@@ -196,7 +196,7 @@ void run(const CLI::App& command, const CalibrateLatencyOptions& options, Comman
   Verdict verdict = calibration::latency_verdict(found->latency, found->names.a, found->names.b);
   for (const std::string& reason : odd.reasons) verdict.add(Grade::pass, reason);
   found->drops.tell(verdict);
-  tell_doubts(*recording, *field, verdict);
+  const std::string doubt = tell_doubts(*recording, *field, verdict);
   if (verdict.grade != Grade::fail) {
     const Latency& l = found->latency;
     fmt::print("offset {:.2f} ms (95 %: {:.2f} to {:.2f}), drift {:.1f} ppm (95 %: {:.1f} to {:.1f})\n{}\n",
@@ -212,11 +212,13 @@ void run(const CLI::App& command, const CalibrateLatencyOptions& options, Comman
   }
   finish_calibration(options.paths, out_text(found->latency), std::move(json),
                      latency_page(found->latency, verdict, found->names, found->advice), verdict, status,
-                     {made_from(options), [&found](auto& record, const auto& provenance) {
+                     {made_from(options),
+                      [&found](auto& record, const auto& provenance) {
                         const Latency& l = found->latency;
                         record.latency = calibration::LatencyEntry{provenance, l.offset_ms, l.offset_ci95_ms[0],
                                                                    l.offset_ci95_ms[1], l.drift_ppm};
-                      }});
+                      },
+                      doubt});
 }
 
 }  // namespace

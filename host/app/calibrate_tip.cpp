@@ -110,14 +110,16 @@ void print(const TipFound& found, const TipInput& input) {
 }
 
 /// What a record keeps of it.
-RecordEntry entry_of(const TipFound& found, const TipInput& input) {
+RecordEntry entry_of(const TipFound& found, const TipInput& input, const std::string& doubt) {
   const std::string made_from =
       fmt::format("{} poses of {} in {} divot(s)", input.set.poses.size(), input.source, input.divots);
-  return {made_from, [&found](calibration::CalibrationRecord& record, const calibration::Provenance& provenance) {
+  return {made_from,
+          [&found](calibration::CalibrationRecord& record, const calibration::Provenance& provenance) {
             const Pivot& pivot = *found.pivot;
             record.tip = calibration::TipEntry{provenance, pivot.robust.tip_in_sensor_mm, pivot.tip_covariance_mm2,
                                                pivot.robust.rms_mm};
-          }};
+          },
+          doubt};
 }
 
 }  // namespace
@@ -157,10 +159,10 @@ void add_calibrate_tip(CLI::App& calibrate, CommandStatus& status) {
     if (!input) return status.refuse(input.error());
     auto found = calibrate_tip(*input);
     if (!found) return status.refuse(found.error());
-    tell_doubts(*source, *field, found->verdict);
+    const std::string doubt = tell_doubts(*source, *field, found->verdict);
     print(*found, *input);
     finish_calibration(options->results, tip_text(*found), tip_json(*found, *input), tip_page(*found, *input),
-                       found->verdict, status, entry_of(*found, *input));
+                       found->verdict, status, entry_of(*found, *input, doubt));
   });
 }
 

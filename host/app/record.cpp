@@ -92,6 +92,10 @@ Verdict judge(const RecordingWriter& writer, const Ending& ending, bool finished
                 fmt::format("{} of {:.0f} frames are missing", figures.frames_missing, all));
   }
   for (const std::string& note : writer.notes()) verdict.add(Grade::marginal, note);
+  if (!writer.rests_on().empty()) {
+    verdict.add(Grade::marginal,
+                fmt::format("UNSIGNED: the poses rest on what no known machine signed ({})", writer.rests_on()));
+  }
   return verdict;
 }
 

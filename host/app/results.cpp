@@ -98,12 +98,16 @@ Result<AdmittedField> admit_field(const std::filesystem::path& map, const std::s
   return AdmittedField{std::nullopt, *doubt};
 }
 
-void tell_doubts(const AdmittedRecording& recording, const AdmittedField& field, Verdict& verdict) {
-  const auto tell = [&verdict](const std::string& what, const std::string& doubt) {
-    if (!doubt.empty()) verdict.add(Grade::marginal, words("why_unsigned", what, doubt));
+std::string tell_doubts(const AdmittedRecording& recording, const AdmittedField& field, Verdict& verdict) {
+  std::string kept;
+  const auto tell = [&](const std::string& what, const std::string& doubt) {
+    if (doubt.empty()) return;
+    verdict.add(Grade::marginal, words("why_unsigned", what, doubt));
+    if (kept.empty()) kept = fmt::format("the {} is {}", what, doubt);
   };
   tell(words("unsigned_recording"), recording.doubt);
   tell(words("unsigned_field"), field.doubt);
+  return kept;
 }
 
 void tell_not_written(const std::filesystem::path& path) {

@@ -35,8 +35,9 @@ Result<AdmittedRecording> admit_source(const std::filesystem::path& recording, c
 /// map, server: empty where there is none.
 Result<AdmittedField> admit_field(const std::filesystem::path& map, const std::string& server,
                                   const ResultPaths& paths);
-/// What the verdict says of them: it passes no more where no known machine signed one.
-void tell_doubts(const AdmittedRecording& recording, const AdmittedField& field, Verdict& verdict);
+/// What the verdict says of them: it passes no more where no known machine signed one. Answers what a record keeps of
+/// that; empty: known machines signed both.
+std::string tell_doubts(const AdmittedRecording& recording, const AdmittedField& field, Verdict& verdict);
 
 /// Says on stderr that a file is not written for a verdict of fail, and whether one of an earlier run is there, which
 /// somebody may take for this run's. Nothing of an empty path.

@@ -40,6 +40,7 @@ struct Found {
   std::optional<calibration::FileSignature> signature;
   std::vector<std::string> faults;  ///< what is not as it was signed
   std::string why_unsigned;         ///< more than that it is; or empty
+  std::string rests_on{};           ///< what it rests on that no known machine had signed; empty: on nothing such
 };
 
 constexpr const char* k010SignedNothing = "it is of version 0.1, which signed nothing";
@@ -53,7 +54,10 @@ Found of_record(const fs::path& path) {
   constexpr const char* kWhat = "calibration record";
   const auto read = read_signed_record(path);
   if (!read) return changed(kWhat, read.error());
-  return {kWhat, calibration::kRecordFormat, read->sha256, read->signature, {}, read->of_010 ? k010SignedNothing : ""};
+  Found out{kWhat, calibration::kRecordFormat,           read->sha256, read->signature,
+            {},    read->of_010 ? k010SignedNothing : ""};
+  out.rests_on = doubt_of(read->record);
+  return out;
 }
 
 Found of_field_map(const fs::path& path) {
@@ -69,8 +73,7 @@ Found of_operation(const fs::path& path) {
   const auto read = read_signed_operation(path);
   if (!read) return changed(kWhat, read.error());
   Found out{kWhat, kOperationFormat, read->by.sha256, read->by.signature, {}, ""};
-  if (const std::string& doubt = read->operation.doubt; !doubt.empty())
-    out.faults.push_back("rests on what no known machine had signed: " + doubt);
+  out.rests_on = read->operation.doubt;
   return out;
 }
 
@@ -82,6 +85,7 @@ Found of_session(const fs::path& folder) {
   for (const std::string& file : read->changed) out.faults.push_back("changed: " + file);
   for (const std::string& file : read->missing) out.faults.push_back("missing: " + file);
   for (const std::string& file : read->added) out.faults.push_back("added: " + file);
+  out.rests_on = read->rests_on;
   if (!read->ended) out.why_unsigned = "it was cut short";
   if (read->ended && !read->signature) out.why_unsigned = "version 0.1 signed nothing";
   return out;
@@ -93,6 +97,7 @@ Found of_appliance(const fs::path& path) {
   if (!read) return changed(kWhat, read.error());
   Found out{kWhat, calibration::kApplianceRecordingFormat, read->sha256, read->signature, {}, ""};
   if (read->more) out.faults.emplace_back("added: bytes behind the signature");
+  out.rests_on = read->rests_on;
   out.why_unsigned = "it was cut short, still grows, or is of version 0.1";
   return out;
 }
@@ -149,20 +154,24 @@ bool tell(const fs::path& path, const Found& found, ThisMachine& machine, const 
     return false;
   }
   const bool is_signed = author->standing != Author::Standing::nobody;
+  if (!trust.empty() && author->standing == Author::Standing::known)
+    say("its machine is known already; no name is given");
   if (!trust.empty() && author->standing == Author::Standing::unknown && found.faults.empty()) {
     if (const auto added = machine.trust(trust, author->key); !added) {
       refused = added.error();
       return false;
     }
     author = machine.author_of(found.kind, found.sha256, found.signature);
+    say(fmt::format("{} is known from now on: what it signs is used here, and it may connect", trust));
   }
   for (const std::string& fault : found.faults) say(fault);
+  if (!found.rests_on.empty()) say("rests on what no known machine had signed: " + found.rests_on);
   if (is_signed) {
     say(author->words() + (found.faults.empty() ? ", and as it was signed" : ", and not as it was signed"));
   } else if (!found.kind.empty()) {
     say(author->words() + (found.why_unsigned.empty() ? "" : "; " + found.why_unsigned));
   }
-  return found.faults.empty() && author->standing == Author::Standing::known;
+  return found.faults.empty() && found.rests_on.empty() && author->standing == Author::Standing::known;
 }
 
 Result<ExitCode> run(const VerifyOptions& options) {

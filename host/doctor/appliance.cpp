@@ -31,8 +31,15 @@ ApplianceTold listen_to(wire::Client& client) {
 }
 
 Check status_check(const wire::Status& status) {
-  if (status.ok) return {kAppliance, "status", CheckState::good, status.text.empty() ? "all is well" : status.text, ""};
-  return {kAppliance, "status", CheckState::bad, status.text, "see the instruments below"};
+  Check check{kAppliance, "status", CheckState::good, status.text.empty() ? "all is well" : status.text, ""};
+  const bool rests_on_unsigned = status.text.find("UNSIGNED") != std::string::npos;
+  if (status.ok && !rests_on_unsigned) return check;
+  check.state = status.ok ? CheckState::could_be_better : CheckState::bad;
+  // Who signed a record or a map is no matter of the instruments.
+  const bool of_signatures = rests_on_unsigned || status.text.find("accept_unsigned") != std::string::npos;
+  check.remedy = of_signatures ? "docs/manual/signatures.md says how to have it signed; see the instruments below, too"
+                               : "see the instruments below";
+  return check;
 }
 
 Check instrument_check(const wire::InstrumentHealth& instrument) {

@@ -43,7 +43,9 @@ Check check_author(const calibration::SignedRecord& read) {
     return check;
   }
   check.found = author->words();
-  if (author->standing == Author::Standing::known) return check;
+  const std::string doubt = doubt_of(read.record);
+  if (!doubt.empty()) check.found += fmt::format("; rests on what no known machine had signed ({})", doubt);
+  if (author->standing == Author::Standing::known && doubt.empty()) return check;
   check.state = CheckState::could_be_better;
   check.remedy = "live and replay use it only with --accept-unsigned: docs/manual/signatures.md";
   return check;

@@ -105,6 +105,13 @@ std::vector<Check> check_config(const Machine& machine, const fs::path& config) 
              checked.error().code == Errc::not_found ? "install birdseyed here" : "see whether it is a file"}};
   if (checked->code == 0) {
     std::vector<Check> checks{{kService, name, CheckState::good, "is sound", ""}};
+    // What it says on stderr is of a record or a map that nobody known signed: refused, or used all the same.
+    for (const std::string& line : checked->lines) {
+      if (!line.starts_with("birdseyed: ")) continue;
+      const bool is_used = line.find("UNSIGNED") != std::string::npos;
+      checks.push_back({kService, "signatures", is_used ? CheckState::could_be_better : CheckState::bad,
+                        line.substr(line.find(": ") + 2), "docs/manual/signatures.md says how to have it signed"});
+    }
     const std::vector<Check> named = check_configured(machine, config);
     checks.insert(checks.end(), named.begin(), named.end());
     return checks;

@@ -37,6 +37,15 @@ Result<std::string> Authors::admit_resting_on(const std::string& doubt) const {
   return Error{Errc::bad_value, fmt::format("rests on what no known machine signed ({}); {}", doubt, kAccept)};
 }
 
+Result<std::string> Authors::admit_with_rest(std::string_view kind, std::string_view sha256,
+                                             const std::optional<calibration::FileSignature>& signature,
+                                             const std::string& rests_on) const {
+  auto doubt = admit(kind, sha256, signature);
+  if (!doubt || !doubt->empty() || rests_on.empty()) return doubt;
+  if (auto rest = admit_resting_on(rests_on); !rest) return rest;
+  return fmt::format("made of what no known machine signed ({})", rests_on);
+}
+
 Result<void> note_author(const std::string& path, std::string_view kind, std::string_view sha256,
                          const std::optional<calibration::FileSignature>& signature) {
   const auto authors = Authors::of_this_machine(true);

@@ -27,6 +27,10 @@ struct Authors {
                                           const std::optional<calibration::FileSignature>& signature) const;
   /// The refusal of what rests on something that nobody known has signed.
   [[nodiscard]] Result<std::string> admit_resting_on(const std::string& doubt) const;
+  /// admit(), and then admit_resting_on() of what the file says that it rests on.
+  [[nodiscard]] Result<std::string> admit_with_rest(std::string_view kind, std::string_view sha256,
+                                                    const std::optional<calibration::FileSignature>& signature,
+                                                    const std::string& rests_on) const;
 };
 
 /// Of a report or a conversion, which goes on with what it is given: a line on stderr, where the author is not known.

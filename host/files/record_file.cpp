@@ -21,7 +21,7 @@ Result<calibration::SignedRecord> read_signed_record(const std::filesystem::path
 namespace {
 
 Result<AdmittedRecord> admit(calibration::SignedRecord read, const Authors& authors) {
-  auto doubt = authors.admit(calibration::kRecordFormat, read.sha256, read.signature);
+  auto doubt = authors.admit_with_rest(calibration::kRecordFormat, read.sha256, read.signature, doubt_of(read.record));
   if (!doubt) return Error{doubt.error().code, "the calibration record " + doubt.error().what};
   return AdmittedRecord{std::move(read.record), *std::move(doubt)};
 }
@@ -33,6 +33,7 @@ Result<calibration::CalibrationRecord> read_record(const std::filesystem::path& 
   if (!read) return read.error();
   if (auto noted = note_author(path.string(), calibration::kRecordFormat, read->sha256, read->signature); !noted)
     return noted.error();
+  note_resting_on(path.string(), doubt_of(read->record));
   return std::move(read->record);
 }
 
@@ -61,7 +62,7 @@ Result<std::string> record_with(const std::filesystem::path& path, const RecordE
     if (!read) return read.error();
     record = std::move(read->record);
   }
-  entry.enter(record, {utc_now(), "birdseye " BIRDSEYE_VERSION, entry.made_from, grade});
+  entry.enter(record, {utc_now(), "birdseye " BIRDSEYE_VERSION, entry.made_from, grade, entry.doubt});
   std::string text = record_text(record, *authors.machine);
   // What no reader takes would be written over a record that is sound.
   if (const auto sound = calibration::parse_record(text); !sound)

@@ -13,6 +13,7 @@ namespace birdseye::host {
 struct RecordEntry {
   std::string made_from;  ///< the board and how many views, in words
   std::function<void(calibration::CalibrationRecord&, const calibration::Provenance&)> enter;
+  std::string doubt{};  ///< that it rests on what no known machine signed; empty: on nothing such
 };
 
 /// Reads a calibration record; an error names the file. Who signed it is for the caller to judge.
@@ -22,7 +23,7 @@ Result<calibration::CalibrationRecord> read_record(const std::filesystem::path& 
 
 struct AdmittedRecord {
   calibration::CalibrationRecord record;
-  std::string doubt;  ///< that its author is not known, in words; empty: the author is
+  std::string doubt;  ///< that its author, or that of what it rests on, is not known; empty: all are
 };
 /// One to draw by, or to go on from.
 Result<AdmittedRecord> read_record(const std::filesystem::path& path, const Authors& authors);

@@ -74,11 +74,12 @@ Result<RecordingSeal> read_recording_seal(const fs::path& folder) {
   RecordingSeal out;
   out.sha256 = sheet_sha256(sheet);
   out.ended = sheet.value("ended", nlohmann::json()) == true;
-  // Sums and signature are written together: with one alone, the other's name is damaged, and it was signed.
-  if (!sheet.contains(kSigned) && !sheet.contains(kSums)) return out;
-  const auto there = files_in(folder);
-  if (!there) return there.error();
   try {
+    if (sheet.contains("rests_on")) sheet.at("rests_on").at("unsigned").get_to(out.rests_on);
+    // Sums and signature are written together: with one alone, the other's name is damaged, and it was signed.
+    if (!sheet.contains(kSigned) && !sheet.contains(kSums)) return out;
+    const auto there = files_in(folder);
+    if (!there) return there.error();
     out.signature = calibration::signature_of_json(sheet.at(kSigned));
     const auto sums = sheet.at(kSums).get<std::map<std::string, std::string>>();
     for (const auto& [name, recorded] : sums) {
@@ -107,8 +108,8 @@ Result<AdmittedRecording> admit_appliance_recording(const fs::path& path, const 
                                                "was written",
                                                path.string())};
   auto doubt =
-      authors.admit(calibration::kApplianceRecordingFormat, seal->sha256, seal->signature).with_context(path.string());
-  if (!doubt) return doubt.error();
+      authors.admit_with_rest(calibration::kApplianceRecordingFormat, seal->sha256, seal->signature, seal->rests_on);
+  if (!doubt) return doubt.error().with_context(path.string());
   return AdmittedRecording{*std::move(doubt), ""};
 }
 
@@ -135,7 +136,8 @@ Result<AdmittedRecording> admit_recording(const fs::path& path, const Authors& a
                                "it was written",
                                path.string(), what, fmt::join(*files, ", "))};
   }
-  auto doubt = authors.admit(kSessionRecordingFormat, seal.sha256, seal.signature).with_context(path.string());
+  auto doubt = authors.admit_with_rest(kSessionRecordingFormat, seal.sha256, seal.signature, seal.rests_on)
+                   .with_context(path.string());
   if (!doubt && !seal.signature && !seal.ended)
     return Error{doubt.error().code, doubt.error().what + " (it was cut short, and could not be signed)"};
   if (!doubt) return doubt.error();

@@ -24,12 +24,13 @@ struct RecordingSeal {
   bool ended = false;                                   ///< false: it was cut short, so that nobody could sign it
   std::vector<std::string> changed, missing, added;     ///< files, by their names
   std::string events_sha256;                            ///< of the events as they were signed; empty: nobody signed
+  std::string rests_on;  ///< what its poses rest on that no known machine had signed; empty: on nothing such
 };
 /// Reads all of the recording's files: as long as the disk takes.
 Result<RecordingSeal> read_recording_seal(const std::filesystem::path& folder);
 
 struct AdmittedRecording {
-  std::string doubt;          ///< empty where the author is known, as of Authors::admit()
+  std::string doubt;          ///< that its author, or that of what its poses rest on, is not known; empty: all are
   std::string events_sha256;  ///< that its reader compares the events with; empty: nobody signed
 };
 

@@ -66,7 +66,11 @@ Result<void> RecordingWriter::add(const wire::Event& event) {
   if (const auto* birds = std::get_if<wire::Birds>(&event)) {
     if (auto added = add_birds(*birds); !added) return added;
   }
-  if (const auto* health = std::get_if<wire::Health>(&event)) health_ = *health;
+  if (const auto* health = std::get_if<wire::Health>(&event)) {
+    health_ = *health;
+    // Once told it stays: poses that it corrected are in the recording.
+    if (!health->field_unsigned.empty()) rests_on_ = fmt::format("its map of the field is {}", health->field_unsigned);
+  }
   return add_line(event, {});
 }
 
@@ -310,6 +314,7 @@ Result<void> RecordingWriter::write_sheet(const std::string& why, bool ended) {
     sheet["appliance_frames_dropped"] = health_->frames_dropped;
     sheet["appliance_messages_shed"] = health_->messages_shed;
   }
+  if (!rests_on_.empty()) sheet["rests_on"]["unsigned"] = rests_on_;
   if (ended && settings_.machine) {
     if (auto signed_now = sign_recording(settings_.folder, sheet, *settings_.machine); !signed_now) return signed_now;
   }

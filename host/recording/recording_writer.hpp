@@ -66,6 +66,8 @@ class RecordingWriter {
   [[nodiscard]] const RecordingFigures& figures() const { return figures_; }
   /// What is not as the settings asked for, in words.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+  /// What its poses rest on that no known machine had signed; empty: on nothing such.
+  [[nodiscard]] const std::string& rests_on() const { return rests_on_; }
 
  private:
   RecordingWriter(RecordingSettings settings, OutputFile events, SequenceWriter tracker)
@@ -97,6 +99,7 @@ class RecordingWriter {
   wire::Birds measured_;                             ///< of one time, until there are poses of another
   std::optional<std::uint64_t> last_sequence_;
   std::optional<wire::Health> health_;
+  std::string rests_on_;
   RecordingFigures figures_;
   std::vector<std::string> notes_;
 };

@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "calibration/record/field_map_file.hpp"
 #include "drivers/system/clock.hpp"
 #include "host/files/pose_files.hpp"
 #include "host/recording/recording_reader.hpp"
@@ -96,6 +98,72 @@ TEST(RecordCommand, OfTheSimulatedCart) {
     EXPECT_GE(played.frames, timed.frames) << name << played.ending;
     EXPECT_EQ(read_json(scratch / name / "recording.json")["frames"], played.frames);
   }
+}
+
+/// Moves nothing, anywhere about the cart.
+calibration::FieldMap flat_map() {
+  calibration::FieldMapData data;
+  data.functions.low_mm = {-3000, -3000, -3000};
+  data.functions.high_mm = {3000, 3000, 3000};
+  data.position_mm.assign(4, Eigen::Vector3d::Zero());
+  data.rotation_rad.assign(4, Eigen::Vector3d::Zero());
+  data.sigma_mm.assign(9 * 9 * 9, 0.1);
+  return *calibration::FieldMap::from(std::move(data));
+}
+
+/// What is asked of an appliance that corrects its poses by a map that nobody signed, and of what it and we record
+/// there.
+constexpr const char* kOfAnUnsignedMap =
+    R"(said() { name=$1; shift; "$@" > $name.log 2>&1; echo "$name $?"; cat $name.log; }
+said check $bin/birdseyed --config cart.toml --check
+said doctor $bin/birdseye doctor --server $server
+said record $bin/birdseye record --server $server --out kept --seconds 3
+said live_tip $bin/birdseye calibrate tip --server $server --bird pointer --seconds 3 --out t.txt
+tip="$bin/birdseye calibrate tip --recording kept --tool PointerToTracker --out t.txt"
+said refused $tip
+said verify $bin/birdseye verify kept
+said accepted $tip --accept-unsigned
+kill -TERM $appliance; wait $appliance
+recorded=$(echo rec/*.berec)
+said verify_raw $bin/birdseye verify $recorded
+said replay $bin/birdseyed --config cart.toml --replay $recorded
+$bin/birdseyed --config cart.toml --replay $recorded --accept-unsigned > replay_on.log 2>&1 &
+for n in $(seq 100); do grep -q 'replaying on' replay_on.log && break; sleep 0.1; done
+said replayed_tip $bin/birdseye calibrate tip --server $server --bird pointer --seconds 3 --out t.txt
+cat replay_on.log
+)";
+
+TEST(RecordCommand, OfPosesThatAnUnsignedMapCorrectedSaysSoWhereverTheyGo) {
+  const Scratch scratch;
+  const std::string map = scratch.file(
+      "field.json", calibration::field_map_text(flat_map(), {"2026-11-22T09:30:00Z", "birdseye", "180 places"}));
+  const auto found = testing::run_at_cart(
+      scratch,
+      {.sections = "[calibration]\nfield = \"" + map + "\"\naccept_unsigned = true\n[record]\nfolder = \"" +
+                   (scratch / "rec").string() + "\"\n"},
+      kOfAnUnsignedMap);
+  constexpr const char* kMap = "map of the field is not signed";
+  const auto part = [&found](const std::string& from, const std::string& to) {
+    const std::string all = "\n" + found.output;
+    const std::size_t at = all.find("\n" + from);
+    return at == std::string::npos ? "" : all.substr(at, all.find("\n" + to, at) - at);
+  };
+  const auto expect_part = [&](const std::string& from, const std::string& to, const std::vector<std::string>& words) {
+    for (const std::string& word : words)
+      EXPECT_NE(part(from, to).find(word), std::string::npos) << from << ": " << word;
+  };
+  expect_part("check 0", "doctor", {"UNSIGNED: the ", kMap, "cart.toml: sound"});
+  expect_part("doctor", "record", {kMap, "docs/manual/signatures.md"});
+  expect_part("record 0", "live_tip",
+              {"UNSIGNED: the poses rest on what no known machine signed", kMap, "verdict: marginal"});
+  expect_part("live_tip 2", "refused", {kMap, "--accept-unsigned"});
+  expect_part("refused 2", "verify", {"rests on what no known machine signed", kMap});
+  expect_part("verify 3", "accepted", {"rests on what no known machine had signed", kMap});
+  expect_part("accepted", "verify_raw", {"UNSIGNED: the recording is made of what no known machine signed", kMap});
+  expect_part("verify_raw 3", "replay", {"rests on what no known machine had signed", kMap});
+  expect_part("replay 2", "replayed_tip", {"rests on what no known machine signed", kMap});
+  expect_part("replayed_tip 2", "no such line", {kMap, "--accept-unsigned", "UNSIGNED: "});
+  if (HasFailure()) std::cout << found.output;
 }
 
 TEST(RecordCommand, WithoutAnApplianceNothingIsWritten) {

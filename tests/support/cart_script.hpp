@@ -14,8 +14,9 @@ namespace birdseye::testing {
 /// A simulated cart and the birdseyed that is configured for it.
 struct ScriptedCart {
   int width_px = 192, height_px = 144;
-  std::string simulator;  ///< further options of `birdseye-sim cart`
-  std::string camera;     ///< further lines of the configuration's [camera]
+  std::string simulator{};  ///< further options of `birdseye-sim cart`
+  std::string camera{};     ///< further lines of the configuration's [camera]
+  std::string sections{};   ///< further sections of the configuration
 };
 
 /// Starts both in the scratch folder, runs the commands there once the camera delivers, and ends both. In the commands
@@ -39,7 +40,8 @@ for n in $(seq 150); do grep -q 'camera running' birdseyed.log && break; sleep 0
                        "hemisphere = \"forward\"\nrecord = \"position_matrix\"\ndelay_ms = 7.5\n[camera]\n"
                        "source = \"socket:" +
                        (scratch / "cam").string() + "\"\nwidth = " + width + "\nheight = " + height +
-                       "\nrate_hz = 25\n" + cart.camera + "[wire]\nbind = \"127.0.0.1\"\nport = " + port + "\n");
+                       "\nrate_hz = 25\n" + cart.camera + cart.sections +
+                       "[wire]\nbind = \"127.0.0.1\"\nport = " + port + "\n");
   EXPECT_TRUE(std::filesystem::exists(config));
   const std::string script = scratch.file("cart.sh", kStart + commands);
   // run() begins with one of our programs.

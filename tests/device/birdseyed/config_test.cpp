@@ -79,6 +79,14 @@ TEST(Config, ARecordOfNobodyKnownIsNotUsedUnlessAskedTo) {
   EXPECT_NE(refusal(signed_by(other)).find("add the line \"NAME " + other.key().public_key().hex()), std::string::npos);
   for (const std::string& text : {record_text(record), signed_by(other)})
     EXPECT_EQ(refusal(text, "accept_unsigned = true\n"), "");
+  // Nor one with an entry that rests on what nobody known signed.
+  auto doubtful = record;
+  doubtful.hand_eye->provenance.doubt = "the map of the field is not signed";
+  const std::string of_own =
+      record_text(doubtful, own->sign(calibration::kRecordFormat, calibration::signed_sha256(doubtful)));
+  EXPECT_NE(refusal(of_own).find("rests on what no known machine signed (its hand-eye: the map"), std::string::npos)
+      << refusal(of_own);
+  EXPECT_EQ(refusal(of_own, "accept_unsigned = true\n"), "");
   auto copied = own->sign(calibration::kRecordFormat, std::string(64, '0'));
   EXPECT_NE(refusal(record_text(record, copied), "accept_unsigned = true\n").find("was changed since"),
             std::string::npos);

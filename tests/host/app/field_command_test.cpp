@@ -242,8 +242,19 @@ TEST_F(MappedByCommand, AMapOfNobodyKnownIsUsedOnlyWhenAskedTo) {
     EXPECT_NE(used.output.find("UNSIGNED: the map of the field is not signed"), std::string::npos) << used.output;
     EXPECT_EQ(used.output.find("verdict: pass"), std::string::npos) << used.output;
     expect_refused("birdseye", command + changed + " --accept-unsigned", {"changed.json: ", "was changed since"});
-    EXPECT_EQ(run("birdseye", command + map).output.find("UNSIGNED"), std::string::npos);
+    const auto by_own = run("birdseye", command + map);
+    EXPECT_NE(by_own.code, 2) << by_own.output;
+    EXPECT_EQ(by_own.output.find("UNSIGNED"), std::string::npos) << by_own.output;
   }
+  // What is entered into a record says what it rests on, whoever signs that.
+  const std::string record = (scratch / "record.json").string();
+  const auto entered = run("birdseye", tip + nobodys + " --accept-unsigned --record " + record);
+  EXPECT_NE(entered.code, 2) << entered.output;
+  const auto verified = run("birdseye", "verify " + record);
+  EXPECT_EQ(verified.code, 3) << verified.output;
+  EXPECT_NE(verified.output.find("rests on what no known machine had signed: its tip: the map of the field is not"),
+            std::string::npos)
+      << verified.output;
   for (const char* const command :
        {"calibrate latency --poses a.csv --eye-poses b.csv", "calibrate hand-eye --poses a.csv --eye-poses b.csv"})
     expect_refused("birdseye", command + (" --field " + nobodys), {"nobodys.json: the map of the field is not signed"});
@@ -260,11 +271,15 @@ TEST_F(MappedByCommand, TheApplianceAndTheDailyCheckSayThatNobodyKnownSignedAMap
   const auto told = run("birdseyed", "--check --config " + scratch.file("cart.toml", cart));
   EXPECT_EQ(told.code, 0);
   EXPECT_NE(told.output.find("nobodys.json: the map of the field is not signed"), std::string::npos) << told.output;
+  EXPECT_NE(told.output.find("sound, but no pose will be published"), std::string::npos) << told.output;
   const std::string plate = scratch.file("plate.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\nd3,0,80,0\nd4,80,80,0\n");
   const std::string check = "calibrate field check --plate " + plate + " --measured " +
                             scratch.file("m.csv", "name,x,y,z\nd1,300,0,0\nd2,380,0,0\nd3,300,80,0\nd4,380,80,0\n") +
                             " --history " + (scratch / "h.csv").string() + " --field ";
-  EXPECT_NE(run("birdseye", check + nobodys).output.find("nobodys.json: not signed"), std::string::npos);
+  const auto checked = run("birdseye", check + nobodys);
+  EXPECT_NE(checked.output.find("UNSIGNED: the map of the field is not signed"), std::string::npos) << checked.output;
+  EXPECT_NE(checked.output.find("verdict: marginal"), std::string::npos) << checked.output;
+  EXPECT_NE(run("birdseye", check + nobodys).output.find("replaces today's former"), std::string::npos);
   auto notes = own->notes;
   notes.held_out_mm /= 2;
   expect_refused("birdseye",

@@ -80,6 +80,41 @@ TEST(SignedRecord, OfNobodyOrAnUnknownMachineIsUsedOnlyWhenAskedTo) {
   EXPECT_NE(admit_record(cases[1].first, own).error().what.find("birdseye verify --trust NAME"), std::string::npos);
 }
 
+TEST(SignedRecord, AnEntryThatRestsOnWhatNobodySignedSaysSoWhoeverSignsIt) {
+  const testing::Scratch scratch;
+  const Authors own = Authors::for_once();
+  const std::string path = scratch.file("record.json", record_text(small_record(), *own.machine));
+  RecordEntry entry{"a test", [](auto& record, const auto& provenance) {
+                      record.tip = calibration::TipEntry{provenance, {0, 0, 150}, Eigen::Matrix3d::Identity(), 0.3};
+                    }};
+  const auto with = [&](const std::string& doubt) {
+    entry.doubt = doubt;
+    const auto text = record_with(path, entry, Grade::marginal, own);
+    return text ? *text : text.error().what;
+  };
+  EXPECT_TRUE(admit_record(with(""), own));
+  const std::string doubtful = with("the map of the field is not signed");
+  const auto refused = admit_record(doubtful, own);
+  ASSERT_FALSE(refused);
+  for (const char* words : {"rests on what no known machine signed", "its tip: the map", "--accept-unsigned"})
+    EXPECT_NE(refused.error().what.find(words), std::string::npos) << refused.error().what;
+  const auto accepted = admit_record(doubtful, accepting(own));
+  ASSERT_TRUE(accepted) << accepted.error().what;
+  EXPECT_NE(accepted->doubt.find("the map of the field is not signed"), std::string::npos);
+  // Another entry is made into it only by who asks for it, and does not wash it clean.
+  const std::string kept = scratch.file("doubtful.json", doubtful);
+  const RecordEntry further{"a test", [](auto& record, const auto&) { record.scope = "no. 18"; }};
+  EXPECT_FALSE(record_with(kept, further, Grade::pass, own));
+  const auto more = record_with(kept, further, Grade::pass, accepting(own));
+  ASSERT_TRUE(more) << more.error().what;
+  EXPECT_FALSE(admit_record(*more, own));
+  // Calibrated anew it is sound again.
+  entry.doubt.clear();
+  const auto anew = record_with(kept, entry, Grade::pass, accepting(own));
+  ASSERT_TRUE(anew);
+  EXPECT_TRUE(admit_record(*anew, own));
+}
+
 TEST(SignedRecord, AnEntryIsNotMadeIntoARecordOfAnUnknownMachine) {
   const testing::Scratch scratch;
   const Authors own = Authors::for_once(), other = Authors::for_once();
