@@ -66,6 +66,7 @@ void LiveWorkflow::set_link(bool connected, const std::string& words, bool may_r
     if (!connected && calibration_.withdraw_record(host::words("held_no_link"))) follow_held_back();
     if (!connected) record_tip_in_pointer_mm_.reset();
     if (!connected) reference_.lose();
+    if (!connected) first_heard_.reset();
     if (!connected) pointer_ = {};
     judge_instruments();
   }
@@ -83,6 +84,7 @@ void LiveWorkflow::set_sheet(const calibration::Pattern& pattern, const Eigen::V
 
 void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock) {
   heard_ = now;
+  if (!first_heard_) first_heard_ = now;
   if (reference_.in_use()) {
     const ReferenceSensor::Relative relative = reference_.take(event);
     take(relative.news);
@@ -156,10 +158,17 @@ void LiveWorkflow::take(const wire::Birds& birds) {
   // The hand need not wait for the arithmetic.
   const bool touching = step_ == LiveStep::fiducials ||
                         (step_ == LiveStep::calibrate && fiducials_.confirmed() && calibration_.working_out());
-  if (!rested || !touching || is_other_patients() || !fiducials_.add(*rested, settings_.fiducials, instruments_.now()))
+  // A touch drops a registration that is held back, and the reference that it waits for would then drop the touch.
+  if (!rested || !touching || may_hear_of_reference() || is_other_patients() ||
+      !fiducials_.add(*rested, settings_.fiducials, instruments_.now()))
     return;
   fit();
   keep();
+}
+
+bool LiveWorkflow::may_hear_of_reference() const {
+  constexpr Duration kWithin = Duration::from_ms(2000);  // an appliance tells how it is once a second
+  return fiducials_.held_back() && !connection_.link().health && first_heard_ && heard_ - *first_heard_ < kWithin;
 }
 
 /// What is found holds with the instruments that are connected now, or is held back.

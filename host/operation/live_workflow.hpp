@@ -140,6 +140,8 @@ class LiveWorkflow {
   void update_setup();
   /// As it is calibrated, with its rod as it is turned now. Empty: it is not.
   [[nodiscard]] std::optional<ScopeSetup> scope_as_it_is() const;
+  /// The registration is held back, maybe only because the appliance has not told yet which reference it has.
+  [[nodiscard]] bool may_hear_of_reference() const;
   [[nodiscard]] bool pointer_is_seen() const;
   [[nodiscard]] std::optional<Touch> pointer_held() const;
   [[nodiscard]] std::optional<CheckReading> check_reading() const;
@@ -181,6 +183,7 @@ class LiveWorkflow {
   std::string pick_line_;
   PointerTip pointer_;
   HostTime heard_{};                           ///< now, as it was last told
+  std::optional<HostTime> first_heard_;        ///< of this connection
   std::optional<HostTime> pointer_heard_;      ///< when the pointer was
   std::optional<Eigen::Vector3d> fits_at_mm_;  ///< in doubt, the first place at which it fits; patient frame
   std::size_t landmarks_before_doubt_ = 0;     ///< that were known as the registration came into doubt

@@ -180,7 +180,6 @@ void OperationLaws::take(const wire::Event& event, HostTime now) {
 void OperationLaws::opened(std::size_t checks) {
   accused_ = false;
   to_take_up_ = !kept_.empty();
-  held_back_ = false;
   board_to_take_up_ = board_kept_;
   may_calibrate_since_s_.reset();
   ready_since_s_.reset();
@@ -221,14 +220,6 @@ void OperationLaws::judge_calibration_kept(const host::OperationView& view, doub
 void OperationLaws::judge_registration_kept(const host::OperationView& view, double now_s) {
   using host::LiveStep;
   if (!to_take_up_) return;
-  // Before the window has heard of the reference it holds back the registration that it took up. Where somebody touches
-  // meanwhile, that drops the registration; and as the window hears of the reference, it drops the touch too.
-  const std::string& line = view.note(LiveStep::fiducials).line;
-  held_back_ |= line == host::words("held_reference_gone", kReference);
-  if (held_back_ && (!view.touches.empty() || line == host::words("note_touch_anew"))) {
-    to_take_up_ = false;
-    return;
-  }
   const bool asks = view.asks_for_instruments || view.asks_for_patient;
   const bool ready = !asks && view.note(LiveStep::connect).done && view.note(LiveStep::calibrate).done;
   if (!ready) return ready_since_s_.reset();

@@ -121,7 +121,6 @@ class OperationLaws {
   /// What was kept last, and what was found since. Empty: nothing was kept, or it may have been taken back.
   std::vector<Found> kept_;
   bool to_take_up_ = false;                        ///< the window has still to say what it took up
-  bool held_back_ = false;                         ///< it has said that it does not use that
   bool board_kept_ = false;                        ///< a calibration over the board
   bool board_to_take_up_ = false;                  ///< the window has still to say that it took that up
   std::optional<double> may_calibrate_since_s_;    ///< all is there for it

@@ -433,6 +433,42 @@ TEST_F(Referenced, TheRegistrationHoldsOnlyWithTheSameReference) {
   EXPECT_TRUE(overlaid()) << reason();
 }
 
+/// A window that is opened again knows of no reference until the appliance tells, once a second.
+TEST_F(Referenced, ATouchBeforeItIsHeardOfDropsNoRegistration) {
+  Operation kept;
+  kept.ct_sha256 = workflow_->view().patient->ct_sha256;
+  kept.made_utc = "2026-11-22T10:00:00Z";
+  kept.registered = {kTrackerFromPatient, 0.3, kFiducials, {birdseye::testing::kTracker, {}, 0, "reference"}};
+  const auto folder = scratch_ / "kept";
+  std::filesystem::create_directory(folder);
+  ASSERT_TRUE(write_operation(folder, kept, *testing::authors().machine));
+  const auto open = [&] {
+    LiveSettings settings = operation_settings(scratch_);
+    settings.resume = folder;
+    workflow_ = std::make_unique<LiveWorkflow>(settings);
+    load(*workflow_);
+    workflow_->set_link(true, "connected");
+    measure();
+    give_record(*workflow_);
+    workflow_->go_to(LiveStep::fiducials);
+  };
+  open();
+  touch(kFiducials[1]);
+  EXPECT_NE(workflow_->view().note(LiveStep::fiducials).line.find("and none is used now"), std::string::npos)
+      << workflow_->view().note(LiveStep::fiducials).line;
+  touch({0, 0, 200}, 1);
+  EXPECT_TRUE(workflow_->view().touches.empty());
+  tell_reference("reference");
+  EXPECT_TRUE(workflow_->view().note(LiveStep::fiducials).done) << workflow_->view().note(LiveStep::fiducials).line;
+  EXPECT_EQ(workflow_->view().fre_mm, 0.3);
+  // Where it does not tell, as another server, the patient can be registered anew.
+  open();
+  pass(2500);
+  touch(kFiducials[1]);
+  touch({0, 0, 200}, 1);
+  EXPECT_EQ(workflow_->view().touches.size(), 1U);
+}
+
 TEST_F(Referenced, ARegistrationWithoutAReferenceIsNotUsedWithOne) {
   tell_reference("");
   for (const Eigen::Vector3d& fiducial : kFiducials) touch(fiducial);

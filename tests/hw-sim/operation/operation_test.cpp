@@ -148,8 +148,8 @@ TEST(Operation, MendedSeed108797437DroppedItsRegistrationItself) {
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
-/// A law was wrong: it took for lost what a touch had dropped before the window that was opened again had heard of the
-/// reference.
+/// A touch before the window that was opened again had heard of the reference dropped the registration that it held
+/// back meanwhile.
 TEST(Operation, MendedSeedsTouchedAnewBeforeTheReferenceWasKnown) {
   for (const auto& [seed, minutes] : {std::pair{260668121U, 6.0}, {145140002U, 9.0}}) {
     const OperationOutcome out = operate({.seed = seed, .minutes = minutes});
