@@ -40,18 +40,24 @@ OperationKeeper::~OperationKeeper() {
 }
 
 void OperationKeeper::finish() {
-  constexpr Duration kLook = Duration::from_ms(5);
   if (std::exchange(finished_, true)) return;
-  const auto wait = [this] {
-    const Deadline deadline = Deadline::after(Background<Result<void>>::kEndsWithin);
-    while (writing_.running() && !deadline.passed()) sleep_for(kLook);
-    if (writing_.running()) fault_ = words("note_not_kept", fmt::format("{}: the disk does not answer", out_.string()));
-    if (!writing_.running()) hear();
-    return !writing_.running();
-  };
-  if (!wait() || (newest_ == written_ && !again_)) return;
+  if (!wait_and_hear() || (newest_ == written_ && !again_)) return;
   write();
-  wait();
+  wait_and_hear();
+}
+
+bool OperationKeeper::wait_and_hear() {
+  constexpr Duration kLook = Duration::from_ms(5);
+  const Deadline deadline = Deadline::after(Background<Result<void>>::kEndsWithin);
+  while (writing_.running()) {
+    if (deadline.passed()) {
+      fault_ = words("note_not_kept", fmt::format("{}: the disk does not answer", out_.string()));
+      return false;
+    }
+    sleep_for(kLook);
+  }
+  hear();
+  return true;
 }
 
 void OperationKeeper::keep(Operation operation) {

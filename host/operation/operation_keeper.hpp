@@ -39,6 +39,8 @@ class OperationKeeper {
  private:
   void write();
   void hear();
+  /// hear(), once the write that runs has ended. False: it does not end.
+  bool wait_and_hear();
 
   std::filesystem::path out_, resume_;
   Authors authors_;

@@ -106,28 +106,28 @@ class OperationLaws {
   const OperationTruth& truth_;
   ExposedNs exposed_ns_;
   std::int64_t zero_ns_;
-  bool begins_at_board_;  ///< the appliance has no record: what calibrates is the board
   std::vector<Span> spans_;
   std::optional<wire::Health> before_;
   std::optional<double> ready_since_s_;
-  bool accused_ = false;                  ///< the window says that video and poses do not agree
   std::vector<Move> moves_;               ///< of transmitter or patient, without a reference, in their order
   std::size_t next_move_ = 0;             ///< that has not begun yet
-  bool registered_ = false;               ///< the window says that the patient is
   std::optional<double> whole_s_;         ///< when an overlay was last whole
   std::optional<double> unwatched_to_s_;  ///< nothing could show a motion that ended then, and the window has not asked
   std::uint64_t failed_syncs_ = 0;
   std::optional<double> unsaid_since_s_;  ///< a sync failed then, and the window has not said so
   /// What was kept last, and what was found since. Empty: nothing was kept, or it may have been taken back.
   std::vector<Found> kept_;
-  bool to_take_up_ = false;                        ///< the window has still to say what it took up
-  bool board_kept_ = false;                        ///< a calibration over the board
-  bool board_to_take_up_ = false;                  ///< the window has still to say that it took that up
   std::optional<double> may_calibrate_since_s_;    ///< all is there for it
-  bool whole_picture_ = false;                     ///< the newest frame has the size that the lens is calibrated at
   std::optional<std::size_t> checks_when_opened_;  ///< of a window that takes up; empty: one was checked since
   Figures figures_;
   std::vector<BrokenLaw> broken_;
+  bool begins_at_board_;           ///< the appliance has no record: what calibrates is the board
+  bool accused_ = false;           ///< the window says that video and poses do not agree
+  bool registered_ = false;        ///< the window says that the patient is
+  bool to_take_up_ = false;        ///< the window has still to say what it took up
+  bool board_kept_ = false;        ///< a calibration over the board
+  bool board_to_take_up_ = false;  ///< the window has still to say that it took that up
+  bool whole_picture_ = false;     ///< the newest frame has the size that the lens is calibrated at
 };
 
 }  // namespace birdseye::hw_sim
