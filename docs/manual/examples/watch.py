@@ -32,5 +32,5 @@ while True:
         frame = json.loads(body[4:])
     elif device == b"Health":
         health, pose = json.loads(body[4:]), frame["pose"]
-        print("%-8s %5.1f poses/s, %s; %4.1f frames/s, frame %s: %s %s" % (health["state"], health["tracker_rate_hz"],
+        print("%-8s %5.1f measurements/s, %s; %4.1f frames/s, frame %s: %s %s" % (health["state"], health["tracker_rate_hz"],
               bird, health["frame_rate_hz"], frame["sequence"], pose["kind"], pose["reason"]), flush=True)
