@@ -49,6 +49,8 @@ enum class FaultKind {
   link_cut,
   appliance_restart,
   window_restart,
+  scope_exchanged,
+  link_late,
   disk_late,
   disk_full,
   power_cut,

@@ -22,7 +22,7 @@ constexpr ParameterSpec kBreath[] = {{"mm", 10, 0, 50}, {"period_s", 4, 1, 30}};
 constexpr ParameterSpec kResected[] = {
     {"width_mm", 40, 5, 150}, {"depth_mm", 20, 1, 60}, {"aside_mm", 35, -100, 100}, {"over_s", 0, 0, 600}};
 constexpr ParameterSpec kZoomed[] = {{"factor", 1.3, 0.5, 3}, {"over_s", 0.5, 0, 600}};
-constexpr ParameterSpec kDiskMs[] = {{"ms", 300, 0, 10'000}};
+constexpr ParameterSpec kDelayMs[] = {{"ms", 300, 0, 10'000}};
 constexpr ParameterSpec kCut[] = {{"after_syncs", 1, 0, 1000, true}};
 constexpr ParameterSpec kTurned[] = {{"deg", 30, -180, 180}, {"over_s", 0.5, 0, 600}};
 
@@ -62,7 +62,9 @@ constexpr FaultSpec kTable[] = {
     {FaultKind::link_cut, false, false, false, true, WithoutEnd::once, {}},
     {FaultKind::appliance_restart, false, false, false, true, WithoutEnd::refused, {}},
     {FaultKind::window_restart, false, false, false, true, WithoutEnd::refused, {}},
-    {FaultKind::disk_late, false, false, false, true, WithoutEnd::refused, kDiskMs},
+    {FaultKind::scope_exchanged, false, false, false, true, WithoutEnd::refused, {}},
+    {FaultKind::link_late, false, false, false, true, WithoutEnd::refused, kDelayMs},
+    {FaultKind::disk_late, false, false, false, true, WithoutEnd::refused, kDelayMs},
     {FaultKind::disk_full, false, false, false, true, WithoutEnd::refused, {}},
     {FaultKind::power_cut, false, false, false, true, WithoutEnd::refused, kCut},
 };

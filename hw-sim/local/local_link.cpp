@@ -34,6 +34,7 @@ struct LocalNetwork::State {
 
   Settings settings;
   std::mutex mutex;  // of what follows, and of all connections
+  Duration late;     // of what the server sends
   Condition changed;
   std::deque<std::unique_ptr<wire::Link>> calling;
   std::vector<std::weak_ptr<OneWay>> ways;
@@ -46,8 +47,10 @@ using OneWay = LocalNetwork::State::OneWay;
 
 class LocalLink final : public wire::Link {
  public:
-  LocalLink(std::shared_ptr<LocalNetwork::State> network, std::shared_ptr<OneWay> in, std::shared_ptr<OneWay> out)
-      : network_(std::move(network)), in_(std::move(in)), out_(std::move(out)) {}
+  enum class End { client, server };
+  LocalLink(std::shared_ptr<LocalNetwork::State> network, End end, std::shared_ptr<OneWay> in,
+            std::shared_ptr<OneWay> out)
+      : network_(std::move(network)), end_(end), in_(std::move(in)), out_(std::move(out)) {}
   ~LocalLink() override {
     const std::lock_guard lock(network_->mutex);
     in_->ended = out_->ended = true;
@@ -80,7 +83,10 @@ class LocalLink final : public wire::Link {
     const std::lock_guard lock(network_->mutex);
     if (out_->ended) return Error{Errc::disconnected, "the other side has gone"};
     const std::size_t room = network_->settings.holds - std::min(network_->settings.holds, out_->held);
-    LocalNetwork::State::OnItsWay sent{device_now() + network_->settings.delay, {}};
+    DeviceTime due = device_now() + network_->settings.delay;
+    if (end_ == End::server) due = due + network_->late;
+    if (!out_->parts.empty()) due = std::max(due, out_->parts.back().due);
+    LocalNetwork::State::OnItsWay sent{due, {}};
     for (const auto& part : parts) {
       const std::size_t taken = std::min(part.size(), room - sent.bytes.size());
       sent.bytes.insert(sent.bytes.end(), part.begin(), part.begin() + static_cast<std::ptrdiff_t>(taken));
@@ -113,6 +119,7 @@ class LocalLink final : public wire::Link {
 
  private:
   std::shared_ptr<LocalNetwork::State> network_;
+  End end_;
   std::shared_ptr<OneWay> in_, out_;
 };
 
@@ -185,7 +192,7 @@ std::unique_ptr<wire::Listener> LocalNetwork::listener() const {
 
 std::unique_ptr<wire::Link> LocalNetwork::connect() const {
   const auto up = std::make_shared<OneWay>(), down = std::make_shared<OneWay>();
-  auto here = std::make_unique<LocalLink>(state_, down, up);
+  auto here = std::make_unique<LocalLink>(state_, LocalLink::End::client, down, up);
   const std::lock_guard lock(state_->mutex);
   if (!state_->listened) {
     up->ended = down->ended = true;
@@ -193,9 +200,14 @@ std::unique_ptr<wire::Link> LocalNetwork::connect() const {
   }
   std::erase_if(state_->ways, [](const auto& way) { return way.expired(); });
   state_->ways.insert(state_->ways.end(), {up, down});
-  state_->calling.push_back(std::make_unique<LocalLink>(state_, up, down));
+  state_->calling.push_back(std::make_unique<LocalLink>(state_, LocalLink::End::server, up, down));
   state_->changed.notify_all();
   return here;
+}
+
+void LocalNetwork::set_late(Duration late) const {
+  const std::lock_guard lock(state_->mutex);
+  state_->late = late;
 }
 
 void LocalNetwork::cut() const {

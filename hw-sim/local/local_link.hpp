@@ -21,6 +21,8 @@ class LocalNetwork {
   [[nodiscard]] std::unique_ptr<wire::Listener> listener() const;
   /// A client's end of a new connection.
   [[nodiscard]] std::unique_ptr<wire::Link> connect() const;
+  /// From now on each byte that the server sends takes so much longer; none overtakes another.
+  void set_late(Duration late) const;
   /// Cuts all connections that stand, as a cable does that is pulled.
   void cut() const;
 

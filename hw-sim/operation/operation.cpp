@@ -1,8 +1,10 @@
 #include "hw-sim/operation/operation.hpp"
 
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 #include <functional>
@@ -120,8 +122,7 @@ class Announcer {
   std::size_t next_ = 0;
 };
 
-device::Config config_of(const OperationTruth& truth, const host::Authors& authors, const LocalLine& line,
-                         const LocalCamera& camera) {
+device::Config config_of(const OperationTruth& truth, const LocalLine& line, const LocalCamera& camera) {
   device::Config config;
   config.tracker.line.device = "/sim/tracker";
   config.tracker.open_line = [&line](const auto&) { return line.open(); };
@@ -131,11 +132,10 @@ device::Config config_of(const OperationTruth& truth, const host::Authors& autho
     config.core.bird_names.emplace_back(kReference);
     config.tracker.reference = kReference;
   }
-  if (!truth.at_board(0)) config.core.calibration = host::record_text(truth.record(), *authors.machine);
   config.core.pose.smoothing = Duration::from_ms(40);
   config.core.pose_wait = Duration::from_ms(60);
-  config.camera.width_px = truth.lens().width_px;
-  config.camera.height_px = truth.lens().height_px;
+  config.camera.width_px = truth.lens(0).width_px;
+  config.camera.height_px = truth.lens(0).height_px;
   config.camera.rate_hz = kVideo_hz;
   config.open_camera = [&camera](const auto&) { return camera.open(); };
   return config;
@@ -154,6 +154,14 @@ TrackerScript tracker_of(const OperationTruth& truth, std::uint64_t seed, const 
     return {pose.rotation(), pose.translation()};
   };
   return {settings, motion, device_now().ns};
+}
+
+/// While the appliance is off.
+std::vector<double> scope_exchanges(const FaultScript& faults) {
+  std::vector<double> at_s;
+  for (const Fault& fault : faults.programs)
+    if (fault.kind == FaultKind::scope_exchanged) at_s.push_back(fault.at_s + *fault.for_s / 2);
+  return at_s;
 }
 
 /// Events to the workflow until the screen is drawn the next time, as the window takes them.
@@ -178,15 +186,17 @@ std::string words_of(const host::ShownPicture& shown) {
 /// birdseyed and its server. An operation ends both and starts them again.
 class ApplianceProgram {
  public:
-  ApplianceProgram(device::Config config, const LocalNetwork& network)
-      : config_(std::move(config)), network_(network) {}
+  /// records: of the two scopes, as texts; empty where a scope has none.
+  ApplianceProgram(device::Config config, std::array<std::string, 2> records, const LocalNetwork& network)
+      : config_(std::move(config)), records_(std::move(records)), network_(network) {}
 
-  /// Starts it, or ends it, where it does not run or end already.
-  Result<void> run(bool on) {
+  /// Starts it with the record of this scope, or ends it, where it does not run or end already.
+  Result<void> run(bool on, std::size_t scope) {
     if (on == (appliance_ != nullptr)) return {};
     appliance_.reset();
     server_.reset();
     if (!on) return {};
+    config_.core.calibration = records_[scope];
     server_ = wire::Server::over(network_.listener());
     auto started = device::Appliance::start(config_, *server_);
     if (!started) return std::move(started).error();
@@ -196,6 +206,7 @@ class ApplianceProgram {
 
  private:
   device::Config config_;
+  std::array<std::string, 2> records_;
   const LocalNetwork& network_;
   std::unique_ptr<wire::Server> server_;
   std::unique_ptr<device::Appliance> appliance_;
@@ -264,6 +275,11 @@ class WindowDisk {
   bool cutting_ = false;
 };
 
+std::size_t heap_bytes_in_use() {
+  const struct mallinfo2 info = mallinfo2();
+  return info.uordblks + info.hblkhd;
+}
+
 /// Runs the operation, in virtual time. open: opens a window. scene: null where the video is grey.
 void operate(const SimulatedOperation& operation, OperationTruth& truth, OperationScene* scene,
              const host::Authors& authors, LocalDisk& disk, const WindowProgram::Open& open, OperationOutcome& out) {
@@ -272,8 +288,8 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
   TrackerLoop unit(line.instrument(), tracker_of(truth, operation.seed, out.faults, zero_ns), {});
   unit.align(zero_ns + 1);  // before the first measurement
   LocalCamera::Settings camera_settings;
-  camera_settings.width_px = truth.lens().width_px;
-  camera_settings.height_px = truth.lens().height_px;
+  camera_settings.width_px = truth.lens(0).width_px;
+  camera_settings.height_px = truth.lens(0).height_px;
   if (scene != nullptr) {
     camera_settings.look = [scene, zero_ns](std::int64_t exposed_ns) {
       return scene->look(static_cast<double>(exposed_ns - zero_ns) * 1e-9);
@@ -284,7 +300,10 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
   camera_settings.timing.faults = out.faults.camera;
   const LocalCamera camera(camera_settings, zero_ns);
   const LocalNetwork network({.delay = Duration::from_ms(1)});
-  ApplianceProgram appliance(config_of(truth, authors, line, camera), network);
+  std::array<std::string, 2> records;
+  for (std::size_t scope = 0; scope < records.size() && !truth.at_board(0); ++scope)
+    records[scope] = host::record_text(truth.record_of(scope), *authors.machine);
+  ApplianceProgram appliance(config_of(truth, line, camera), std::move(records), network);
   WindowProgram window(open, network);
   WindowDisk window_disk(disk, window);
   FaultTimeline befalling(out.faults.programs, FaultTarget::program);
@@ -304,7 +323,11 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
       network.cut();
       befalling.done(FaultKind::link_cut, device_now().ns);
     }
-    const auto serves = appliance.run(befalling.active(FaultKind::appliance_restart) == nullptr);
+    const Fault* const late = befalling.active(FaultKind::link_late);
+    network.set_late(Duration::from_seconds(late != nullptr ? late->value("ms") * 1e-3 : 0));
+    const bool ends = befalling.active(FaultKind::appliance_restart) != nullptr ||
+                      befalling.active(FaultKind::scope_exchanged) != nullptr;
+    const auto serves = appliance.run(!ends, truth.scope_in_use(journal.at_s(host_now())));
     if (!serves) return out.broken.push_back({journal.at_s(host_now()), "start", serves.error().what});
     const auto powered = window_disk.befall(befalling, journal.at_s(host_now()));
     if (!powered) return out.broken.push_back({journal.at_s(host_now()), "start", powered.error().what});
@@ -337,6 +360,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     if (journal.at_s(now) < acts_at_s) continue;
     acts_at_s = journal.at_s(now) + kActs_s;
     surgeon.act(journal.at_s(now), now, shown);
+    laws.take_memory(heap_bytes_in_use(), now);
     const host::OperationView view = workflow.view();
     laws.take(view, surgeon.checks(), now);
     const host::StepNote& note = view.note(view.step);
@@ -361,6 +385,7 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
   OperationOutcome out;
   const bool reference = operation.reference.value_or(hashed_uniform(hashed_word(operation.seed, 5), 0) < 0.5);
   out.reference = reference;
+  const bool at_board = operation.pictures && hashed_uniform(hashed_word(operation.seed, 8), 0) < kAtBoard;
   const double ends_s = operation.minutes * 60;
   if (operation.faults) {
     out.faults = *operation.faults;
@@ -371,11 +396,23 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
     if (operation.disk_fails)
       std::ranges::move(draw_disk_faults(operation.seed, kFaultsFrom_s, until_s),
                         std::back_inserter(out.faults.programs));
+    if (operation.link_is_late)
+      std::ranges::move(draw_link_faults(operation.seed, kFaultsFrom_s, until_s),
+                        std::back_inserter(out.faults.programs));
+    if (operation.scopes_change && !at_board)
+      std::ranges::move(draw_scope_exchanges(operation.seed, kFaultsFrom_s, until_s),
+                        std::back_inserter(out.faults.programs));
     if (operation.pictures && !reference) draw_bumps_in_view(operation.seed, kFaultsFrom_s, until_s, out.faults);
   }
-  const bool at_board = operation.pictures && hashed_uniform(hashed_word(operation.seed, 8), 0) < kAtBoard;
   const VideoSize size = at_board ? kOfBoard : operation.pictures ? kPictures : kGrey;
   OperationTruth truth(operation.seed, size.width_px, size.height_px, Happenings(out.faults.world), reference);
+  std::vector<double> exchanged_at_s = scope_exchanges(out.faults);
+  if (at_board && !exchanged_at_s.empty()) {
+    return Error{Errc::bad_value, fmt::format("scope_exchanged: the scope of seed {} is calibrated over a board, and "
+                                              "nobody has a record of another; give another seed",
+                                              operation.seed)};
+  }
+  truth.exchange_scopes(std::move(exchanged_at_s));
   WindowSettings window;
   window.video_must_agree = operation.pictures;
   if (at_board) {

@@ -68,6 +68,10 @@ constexpr DrawnFault kDrawnOfPrograms[] = {
     {FaultKind::window_restart, kProgram, 1, 10},
 };
 
+constexpr DrawnFault kDrawnOfLink[] = {{FaultKind::link_late, kProgram, 1, 20, "ms", 20, 3000}};
+
+constexpr DrawnFault kDrawnOfScopes[] = {{FaultKind::scope_exchanged, kProgram, 2, 20}};
+
 constexpr DrawnFault kDrawnOfDisk[] = {
     {FaultKind::disk_late, kProgram, 5, 20, "ms", 10, 1500},
     {FaultKind::disk_full, kProgram, 5, 60},
@@ -117,7 +121,9 @@ FaultSigns of_program(const Fault& fault) {
   if (fault.kind == FaultKind::disk_full) return {.aside = true};
   if (fault.kind == FaultKind::disk_late) return {};  // a window that is closed waits for it
   constexpr double kConnects_s = 1.1;                 // the window tries each second
-  return {.own_s = kConnects_s + (fault.kind == FaultKind::appliance_restart ? kFlockStarts_s : 0)};
+  if (fault.kind == FaultKind::link_late) return {.own_s = kConnects_s + fault.value("ms") * 1e-3};
+  const bool tracker_starts = fault.kind == FaultKind::appliance_restart || fault.kind == FaultKind::scope_exchanged;
+  return {.own_s = kConnects_s + (tracker_starts ? kFlockStarts_s : 0)};
 }
 
 }  // namespace
@@ -206,6 +212,20 @@ void draw_bumps_in_view(std::uint64_t seed, double from_s, double until_s, Fault
 std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double until_s) {
   std::vector<Fault> faults;
   draw(kDrawnOfPrograms, hashed_word(seed, 6), 90, from_s, until_s,
+       [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
+  return faults;
+}
+
+std::vector<Fault> draw_scope_exchanges(std::uint64_t seed, double from_s, double until_s) {
+  std::vector<Fault> faults;
+  draw(kDrawnOfScopes, hashed_word(seed, 12), 300, from_s, until_s,
+       [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
+  return faults;
+}
+
+std::vector<Fault> draw_link_faults(std::uint64_t seed, double from_s, double until_s) {
+  std::vector<Fault> faults;
+  draw(kDrawnOfLink, hashed_word(seed, 14), 150, from_s, until_s,
        [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
   return faults;
 }

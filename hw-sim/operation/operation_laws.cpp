@@ -23,10 +23,12 @@ constexpr double kTimeLimit_s = 0.010;  // of [pose] max_time_sigma_ms: what TDA
 constexpr double kMostAge_ms = 150;
 constexpr double kMostCircles = 3, kPromisedCircles = 1.5;
 constexpr double kNamedWithin_s = 2, kOverWithin_s = 2;
-constexpr double kTakesUpWithin_s = 2;    // once the instruments are those that it was registered with
-constexpr double kCalm_s = 10;            // after a fault's end what it had the window see may still be weighed
-constexpr double kAlone_s = 5;            // from another fault's end to this one's begin, and after it
-constexpr double kLinger_s = 0.5;         // after a fault's end poses may still be made of samples that it touched
+constexpr double kTakesUpWithin_s = 2;  // once the instruments are those that it was registered with
+constexpr double kCalm_s = 10;          // after a fault's end what it had the window see may still be weighed
+constexpr double kAlone_s = 5;          // from another fault's end to this one's begin, and after it
+constexpr double kLinger_s = 0.5;       // after a fault's end poses may still be made of samples that it touched
+constexpr double kSettles_s = 120;      // until all has been done once, and what may be held is held
+constexpr std::size_t kMostGrowth = std::size_t{16} << 20;
 constexpr std::size_t kMostBroken = 100;  // that are told
 
 double speed_mm_s(const OperationTruth& truth, std::size_t bird, double at_s) {
@@ -124,7 +126,7 @@ void OperationLaws::take(const wire::Birds& birds, double now_s) {
 
 void OperationLaws::take(const wire::VideoFrame& frame, double now_s) {
   ++figures_.frames;
-  whole_picture_ = frame.width_px == truth_.lens().width_px;
+  whole_picture_ = frame.width_px == truth_.lens(now_s).width_px;
   for (Span& span : spans_) {
     if (span.signs.half_size && now_s >= span.begins_s && !span.named_s && !whole_picture_) span.named_s = now_s;
   }
@@ -227,7 +229,7 @@ void OperationLaws::judge_registration_kept(const host::OperationView& view, dou
   ready_since_s_ = since_s;
   if (view.note(LiveStep::fiducials).done) {
     to_take_up_ = false;
-    const std::optional<Found> found = found_in(view);
+    const std::optional<Found> found = found_in(view, now_s);
     if (!view.touches.empty() || (found && is_kept(*found))) return;
     return break_law(now_s, "kept",
                      "the window was opened again, and has another registration or deformation than was kept");
@@ -237,15 +239,19 @@ void OperationLaws::judge_registration_kept(const host::OperationView& view, dou
   break_law(now_s, "kept", "the window was opened again, and the patient is not registered any more");
 }
 
-std::optional<OperationLaws::Found> OperationLaws::found_in(const host::OperationView& view) {
+std::optional<OperationLaws::Found> OperationLaws::found_in(const host::OperationView& view, double now_s) {
+  // Before, the window holds what it found with the former scope.
+  if (view.note(host::LiveStep::calibrate).done) scope_ = truth_.scope_in_use(now_s);
   if (!view.note(host::LiveStep::fiducials).done || !view.fre_mm) return std::nullopt;
-  return Found{*view.fre_mm, view.deformed ? view.deformed->made_utc : std::string()};
+  return Found{*view.fre_mm, view.deformed ? view.deformed->made_utc : std::string(), scope_};
 }
 
 bool OperationLaws::is_kept(const Found& found) const {
   constexpr double kSame_mm = 1e-6;
   return std::ranges::any_of(kept_, [&](const Found& one) {
-    return std::abs(one.fre_mm - found.fre_mm) < kSame_mm && one.deformed_utc == found.deformed_utc;
+    // By the views of one scope the organ is not deformed for another.
+    const std::string deformed_utc = one.scope == found.scope ? one.deformed_utc : std::string();
+    return std::abs(one.fre_mm - found.fre_mm) < kSame_mm && found.deformed_utc == deformed_utc;
   });
 }
 
@@ -256,9 +262,9 @@ void OperationLaws::take_kept(const host::OperationView& view, std::uint64_t fai
   board_kept_ |= all_kept && begins_at_board_ && view.note(host::LiveStep::calibrate).done;
   // What a window has not taken up yet is there all the same.
   if (!to_take_up_) {
-    const std::optional<Found> found = found_in(view);
+    const std::optional<Found> found = found_in(view, now_s);
     if (all_kept || !found) kept_.clear();
-    if (found && !is_kept(*found) && (all_kept || !kept_.empty())) kept_.push_back(*found);
+    if (found && std::ranges::count(kept_, *found) == 0 && (all_kept || !kept_.empty())) kept_.push_back(*found);
   }
   if (std::exchange(failed_syncs_, failed_syncs) < failed_syncs && !unsaid_since_s_) unsaid_since_s_ = now_s;
   const bool said = view.fault.starts_with(host::words("note_not_kept", ""));
@@ -267,6 +273,16 @@ void OperationLaws::take_kept(const host::OperationView& view, std::uint64_t fai
   if (!unsaid_since_s_ || now_s - *unsaid_since_s_ < kNamedWithin_s) return;
   unsaid_since_s_.reset();
   break_law(now_s, "kept", "what was found could not be kept, and the window does not say so");
+}
+
+void OperationLaws::take_memory(std::size_t bytes, HostTime now) {
+  const double now_s = at_s(now.ns);
+  if (now_s < kSettles_s) {
+    most_bytes_ = std::max(most_bytes_, bytes);
+  } else if (bytes > most_bytes_ + kMostGrowth) {
+    break_law(now_s, "memory", fmt::format("{} bytes are held, {} until {} s", bytes, most_bytes_, kSettles_s));
+    most_bytes_ = bytes;
+  }
 }
 
 void OperationLaws::note_motion(bool whole, double now_s) {
@@ -310,6 +326,9 @@ void OperationLaws::take(const host::ShownPicture& shown, const host::LivePictur
   const auto exposed_ns = exposed_ns_(picture.frame()->info.sequence);
   if (!exposed_ns) return break_law(now_s, "age", "an overlay is on a frame that the camera never gave");
   const double exposed_s = at_s(*exposed_ns);
+  const std::size_t scope = truth_.scope_in_use(exposed_s);
+  if (!begins_at_board_ && (!picture.setup() || picture.setup()->camera() != truth_.record_of(scope).lens->camera))
+    break_law(now_s, "setup", "an overlay is drawn with the calibration of a scope that is not in use");
   double lies_s = 0;
   bool lies = false;
   for (const Span& span : spans_) {
@@ -327,10 +346,10 @@ void OperationLaws::take(const host::ShownPicture& shown, const host::LivePictur
   ++figures_.green;
   if (lies || unwatched_to_s_ || moves_at(exposed_s)) return;
   const Eigen::Vector3d true_mm = truth_.camera_from_patient(exposed_s) * truth_.target_mm();
-  const auto true_px = project(truth_.lens(), true_mm);
+  const auto true_px = project(truth_.lens(exposed_s), true_mm);
   const auto drawn_px = project(picture.setup()->camera(), Eigen::Vector3d(*drawn_from * truth_.target_mm()));
   if (!true_px || !drawn_px) return;
-  const double off_mm = (*true_px - *drawn_px).norm() / truth_.lens().fx_px * true_mm.z();
+  const double off_mm = (*true_px - *drawn_px).norm() / truth_.lens(exposed_s).fx_px * true_mm.z();
   const double circles = off_mm / budget->radius95_mm();
   figures_.worst_circles = std::max(figures_.worst_circles, circles);
   if (circles > kPromisedCircles) ++figures_.beyond;

@@ -26,6 +26,7 @@ struct BrokenLaw {
 ///
 /// - pose: no pose is given as good that is off by more than 6 sigma of what it says of itself.
 /// - age: no overlay is on the screen whose frame was exposed more than 150 ms ago.
+/// - setup: no overlay is drawn with the calibration of a scope that is not the one in use.
 /// - circle: no overlay is shown as whole that is off by more than three circles. Without a reference, this is not
 ///   asked of frames that are exposed while transmitter or patient move and 0.1 s after; and where they move while no
 ///   overlay of a registered patient is whole, nothing is watched that could show it: not before the window asks for a
@@ -37,6 +38,7 @@ struct BrokenLaw {
 ///   something was not kept, or what it had later: the registration with its deformation, and the calibration over the
 ///   board. It draws nothing before a landmark has been checked. A window that cannot keep something says so within 2
 ///   s.
+/// - memory: after two minutes it does not grow.
 class OperationLaws {
  public:
   /// exposed_ns: of a frame by its number, as the camera knows it. zero_ns: when the operation's time begins.
@@ -51,6 +53,8 @@ class OperationLaws {
   void take(const host::OperationView& view, std::size_t checks, HostTime now);
   /// The same, of a disk on which so many syncs have failed so far. powerless: it keeps nothing more.
   void take_kept(const host::OperationView& view, std::uint64_t failed_syncs, bool powerless, HostTime now);
+  /// What all programs together hold.
+  void take_memory(std::size_t bytes, HostTime now);
   /// What is on the screen.
   void take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now);
   /// At the end: until_s is when the operation ended.
@@ -84,6 +88,8 @@ class OperationLaws {
   struct Found {
     double fre_mm = 0;
     std::string deformed_utc;  ///< when that was found; empty: the CT is shown as it was taken
+    std::size_t scope = 0;     ///< by whose record
+    bool operator==(const Found&) const = default;
   };
   [[nodiscard]] double at_s(std::int64_t ns) const { return static_cast<double>(ns - zero_ns_) * 1e-9; }
   void break_law(double at_s, const char* law, std::string what);
@@ -97,7 +103,7 @@ class OperationLaws {
   void judge_accusation(bool accused, double now_s);
   void note_motion(bool whole, double now_s);
   /// Empty: the patient is not registered.
-  [[nodiscard]] static std::optional<Found> found_in(const host::OperationView& view);
+  [[nodiscard]] std::optional<Found> found_in(const host::OperationView& view, double now_s);
   [[nodiscard]] bool is_kept(const Found& found) const;
   void judge_registration_kept(const host::OperationView& view, double now_s);
   void judge_calibration_kept(const host::OperationView& view, double now_s);
@@ -113,7 +119,9 @@ class OperationLaws {
   std::size_t next_move_ = 0;             ///< that has not begun yet
   std::optional<double> whole_s_;         ///< when an overlay was last whole
   std::optional<double> unwatched_to_s_;  ///< nothing could show a motion that ended then, and the window has not asked
+  std::size_t most_bytes_ = 0;            ///< that were held until it settled
   std::uint64_t failed_syncs_ = 0;
+  std::size_t scope_ = 0;                 ///< whose record the window had last
   std::optional<double> unsaid_since_s_;  ///< a sync failed then, and the window has not said so
   /// What was kept last, and what was found since. Empty: nothing was kept, or it may have been taken back.
   std::vector<Found> kept_;

@@ -22,23 +22,29 @@ std::size_t bytes_of_picture(const CameraModel& lens) {
 }  // namespace
 
 Result<std::unique_ptr<OperationScene>> OperationScene::create(const OperationTruth& truth, std::uint64_t seed) {
-  auto scope = Laparoscope::create({.lens = truth.lens(), .seed = seed});
-  if (!scope) return std::move(scope).error();
   const Eigen::Vector3d& middle = OperationTruth::organ_middle_mm();
   Cavity cavity;
   cavity.organ = closed_surface(OperationTruth::organ_mm, middle - kReach_mm, middle + kReach_mm, kSurface_mm);
   cavity.wall_centre_mm = truth.target_mm();
   cavity.wall_radius_mm = kWall_mm;
-  (*scope)->set_cavity(cavity);
-  (*scope)->set_bench(BenchPath::board());
-  return std::unique_ptr<OperationScene>(new OperationScene(truth, *std::move(scope)));
+  Scopes scopes;
+  for (std::size_t i = 0; i < truth.scopes_used(); ++i) {
+    auto scope = Laparoscope::create({.lens = truth.lens_of(i), .seed = seed});
+    if (!scope) return std::move(scope).error();
+    (*scope)->set_cavity(cavity);
+    (*scope)->set_bench(BenchPath::board());
+    scopes[i] = *std::move(scope);
+  }
+  return std::unique_ptr<OperationScene>(new OperationScene(truth, std::move(scopes)));
 }
 
 std::vector<std::uint8_t> OperationScene::look(double at_s) {
   const auto noise = std::bit_cast<std::uint64_t>(at_s);
-  if (truth_.at_board(at_s)) return scope_->look_at_bench(truth_.camera_from_marker(at_s), noise);
-  if (truth_.carried(at_s)) return std::vector<std::uint8_t>(bytes_of_picture(truth_.lens()));  // nothing near is lit
-  return scope_->look_into_cavity(truth_.camera_from_patient(at_s), noise);
+  Laparoscope& scope = *scopes_[truth_.scope_in_use(at_s)];
+  if (truth_.at_board(at_s)) return scope.look_at_bench(truth_.camera_from_marker(at_s), noise);
+  if (truth_.carried(at_s))
+    return std::vector<std::uint8_t>(bytes_of_picture(truth_.lens(at_s)));  // nothing near is lit
+  return scope.look_into_cavity(truth_.camera_from_patient(at_s), noise);
 }
 
 }  // namespace birdseye::hw_sim

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -11,7 +12,7 @@
 
 namespace birdseye::hw_sim {
 
-/// What the scope of an operation sees: the board, then the patient's organ in its cavity, traced.
+/// What the scope that an operation has in use sees: the board, then the patient's organ in its cavity, traced.
 class OperationScene {
  public:
   /// truth: outlives it. Errors are Laparoscope::create()'s.
@@ -21,11 +22,11 @@ class OperationScene {
   std::vector<std::uint8_t> look(double at_s);
 
  private:
-  OperationScene(const OperationTruth& truth, std::unique_ptr<Laparoscope> scope)
-      : truth_(truth), scope_(std::move(scope)) {}
+  using Scopes = std::array<std::unique_ptr<Laparoscope>, 2>;
+  OperationScene(const OperationTruth& truth, Scopes scopes) : truth_(truth), scopes_(std::move(scopes)) {}
 
   const OperationTruth& truth_;
-  std::unique_ptr<Laparoscope> scope_;
+  Scopes scopes_;  ///< the second: null where it is never in use
 };
 
 }  // namespace birdseye::hw_sim

@@ -45,7 +45,7 @@ class Numbers {
 }  // namespace
 
 OperationTruth::OperationTruth(std::uint64_t seed, int width_px, int height_px, Happenings happenings, bool reference)
-    : happenings_(std::move(happenings)), reference_(reference), lens_(laparoscope_lens(width_px, height_px)) {
+    : happenings_(std::move(happenings)), reference_(reference) {
   Numbers drawn(hashed_word(seed, 1));
   // The scope comes from below along the patient's z axis; so all sensors stay before the transmitter, and in range.
   at_rest_ = {rotation_exp(drawn.within(0.25)), Vector3d(Vector3d(480, 0, 120) + drawn.within(30))};
@@ -54,27 +54,33 @@ OperationTruth::OperationTruth(std::uint64_t seed, int width_px, int height_px, 
   for (Vector3d& place : fiducials_mm_) place += drawn.within(4);
   target_mm_ = organ_middle_mm() + drawn.within(8);
   hand_.rest_at({0, 0, 200}, 0);
-  calibrate(hashed_word(seed, 2));
+  const CameraModel lens = laparoscope_lens(width_px, height_px);
+  CameraModel narrower = lens;
+  narrower.fx_px *= 1.2;
+  narrower.fy_px *= 1.2;
+  scopes_ = {calibrated(lens, {rotation_exp(Vector3d(0.2, -0.1, 1.5)), {6, -14, -300}}, hashed_word(seed, 2)),
+             calibrated(narrower, {rotation_exp(Vector3d(-0.1, 0.2, -0.7)), {-9, 12, -320}}, hashed_word(seed, 13))};
 }
 
-/// The scope is calibrated as an engineer does it with 20 stations over a board 100 mm away: hand-eye is off by
-/// rotations and translations about the camera, of these sigmas. The record has what was found, and how good it is.
-void OperationTruth::calibrate(std::uint64_t seed) {
+/// found: camera_from_sensor. The scope is calibrated as an engineer does it with 20 stations over a board 100 mm away:
+/// hand-eye is off by rotations and translations about the camera, of these sigmas. The record has what was found, and
+/// how good it is.
+OperationTruth::Scope OperationTruth::calibrated(const CameraModel& lens, const Transform<Camera, Sensor>& found,
+                                                 std::uint64_t seed) {
   constexpr double kTurned_rad = 0.002, kShifted_mm = 0.2, kLens = 0.0004;  // kLens: of the focal length
   constexpr int kStations = 20;
   Numbers drawn(seed);
-  const Transform<Camera, Sensor> found(rotation_exp(Vector3d(0.2, -0.1, 1.5)), {6, -14, -300});
   const Vector3d turned = drawn.normal(kTurned_rad), shifted = drawn.normal(kShifted_mm);
-  camera_from_sensor_ = {rotation_exp(turned) * found.rotation(),
-                         Vector3d(rotation_exp(turned) * found.translation() + shifted)};
+  const Transform<Camera, Sensor> camera_from_sensor(rotation_exp(turned) * found.rotation(),
+                                                     Vector3d(rotation_exp(turned) * found.translation() + shifted));
   // The solver's own terms: exp(w) R and t + d, with d = w x t and the shift.
   Eigen::Matrix<double, 6, 6> by = Eigen::Matrix<double, 6, 6>::Identity();
   by.bottomLeftCorner<3, 3>() = -cross_matrix(found.translation());
   Eigen::Matrix<double, 6, 1> sigma;
   sigma << Vector3d::Constant(kTurned_rad), Vector3d::Constant(kShifted_mm);
 
-  CameraModel found_lens = lens_;
-  const double lens_px = kLens * lens_.fx_px;
+  CameraModel found_lens = lens;
+  const double lens_px = kLens * lens.fx_px;
   const Vector3d focal = drawn.normal(lens_px), middle = drawn.normal(lens_px);
   found_lens.fx_px += focal.x();
   found_lens.fy_px += focal.y();
@@ -89,21 +95,23 @@ void OperationTruth::calibrate(std::uint64_t seed) {
   const double pose_mm = std::hypot(kNoise.position_mm, kNoise.angle_deg * kRadPerDeg * arm_mm);
   const double held_out_mm = std::sqrt(2.0) * std::hypot(own_mm, pose_mm);
 
-  record_.scope = "simulated";
-  record_.tracker = {{"model", "6DFOB"}};
-  record_.camera = {{"model", "simulated"}};
+  calibration::CalibrationRecord record;
+  record.scope = "simulated";
+  record.tracker = {{"model", "6DFOB"}};
+  record.camera = {{"model", "simulated"}};
   const calibration::Provenance provenance{"2026-11-26T09:30:00Z", "birdseye-sim", "the truth", Grade::pass};
-  record_.lens = calibration::LensEntry{provenance, found_lens, "radial3_tangential2", lens_covariance,
-                                        lens_px,    lens_px,    std::nullopt,          std::nullopt};
-  record_.hand_eye = calibration::HandEyeEntry{provenance,
-                                               found,
-                                               by * sigma.cwiseAbs2().asDiagonal() * by.transpose(),
-                                               held_out_mm * lens_.fx_px / kLook_mm,
-                                               held_out_mm * lens_.fx_px / kLook_mm,
-                                               held_out_mm,
-                                               std::nullopt,
-                                               kStations};
-  record_.latency = calibration::LatencyEntry{provenance, 0, -1, 1, 0};
+  record.lens = calibration::LensEntry{provenance, found_lens, "radial3_tangential2", lens_covariance,
+                                       lens_px,    lens_px,    std::nullopt,          std::nullopt};
+  record.hand_eye = calibration::HandEyeEntry{provenance,
+                                              found,
+                                              by * sigma.cwiseAbs2().asDiagonal() * by.transpose(),
+                                              held_out_mm * lens.fx_px / kLook_mm,
+                                              held_out_mm * lens.fx_px / kLook_mm,
+                                              held_out_mm,
+                                              std::nullopt,
+                                              kStations};
+  record.latency = calibration::LatencyEntry{provenance, 0, -1, 1, 0};
+  return {lens, camera_from_sensor, std::move(record)};
 }
 
 const Vector3d& OperationTruth::organ_middle_mm() {
@@ -122,6 +130,16 @@ Transform<Tracker, Patient> OperationTruth::tracker_from_patient(double at_s) co
   const Vector3d table_mm(30, 140, 20);  // the patient lies on it
   return happenings_.transmitter(at_s) * at_rest_ * happenings_.table(at_s, table_mm) *
          happenings_.patient(at_s, table_mm);
+}
+
+void OperationTruth::exchange_scopes(std::vector<double> at_s) {
+  exchanged_at_s_ = std::move(at_s);
+}
+
+std::size_t OperationTruth::scope_in_use(double at_s) const {
+  return static_cast<std::size_t>(
+             std::ranges::count_if(exchanged_at_s_, [at_s](double then) { return then <= at_s; })) %
+         2;
 }
 
 void OperationTruth::hurry(double from_s) {
@@ -164,7 +182,7 @@ Transform<Camera, Marker> OperationTruth::camera_from_marker(double at_s) const 
 Result<void> OperationTruth::begin_at_board(std::uint64_t seed) {
   const Vector3d place_mm(380, -30, 160);
   auto bench =
-      BenchPath::create(Transform<Tracker, Marker>(at_rest_.rotation(), place_mm), lens_, hashed_word(seed, 7));
+      BenchPath::create(Transform<Tracker, Marker>(at_rest_.rotation(), place_mm), lens(0), hashed_word(seed, 7));
   if (!bench) return std::move(bench).error();
   bench_ = *std::move(bench);
   return {};
@@ -172,7 +190,7 @@ Result<void> OperationTruth::begin_at_board(std::uint64_t seed) {
 
 Transform<Tracker, Sensor> OperationTruth::tracker_from_sensor(std::size_t bird, double at_s) const {
   const Transform<Tracker, Patient> on = tracker_from_patient(at_s);
-  if (bird == 0) return on * camera_from_patient(at_s).inverse() * camera_from_sensor_;
+  if (bird == 0) return on * camera_from_patient(at_s).inverse() * scopes_[scope_in_use(at_s)].camera_from_sensor;
   if (bird == 2) return on * patient_from_reference_ * happenings_.reference(at_s);
   const HandPath::Place place = hand_.at(at_s);
   const Transform<Patient, Sensor> pointer(place.turn,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <limits>
@@ -31,6 +32,8 @@ class OperationTruth {
 
   /// The scope has yet to be calibrated: from the beginning on it goes about over a board.
   Result<void> begin_at_board(std::uint64_t seed);
+  /// At each of these times the one of the two scopes that is in use is exchanged for the other.
+  void exchange_scopes(std::vector<double> at_s);
   /// It goes to the patient from then on.
   void leave_board(double at_s) { left_board_s_ = at_s; }
   [[nodiscard]] bool at_board(double at_s) const { return bench_ && at_s < left_board_s_; }
@@ -60,17 +63,29 @@ class OperationTruth {
   /// The signed distance to the surface of the organ that the target lies in.
   [[nodiscard]] static double organ_mm(const Eigen::Vector3d& point_in_patient_mm);
   [[nodiscard]] static const Eigen::Vector3d& organ_middle_mm();
-  [[nodiscard]] const CameraModel& lens() const { return lens_; }
+  /// Of the scope that is in use. Both scopes' pictures have the same size.
+  [[nodiscard]] const CameraModel& lens(double at_s) const { return lens_of(scope_in_use(at_s)); }
+  [[nodiscard]] const CameraModel& lens_of(std::size_t scope) const { return scopes_[scope].lens; }
+  /// 0 or 1.
+  [[nodiscard]] std::size_t scope_in_use(double at_s) const;
+  [[nodiscard]] std::size_t scopes_used() const { return exchanged_at_s_.empty() ? 1 : scopes_.size(); }
   [[nodiscard]] const Eigen::Vector3d& tip_in_pointer_mm() const { return tip_in_pointer_mm_; }
 
   /// What a calibration found of the scope: off the truth as much as it says of itself.
-  [[nodiscard]] const calibration::CalibrationRecord& record() const { return record_; }
+  [[nodiscard]] const calibration::CalibrationRecord& record_of(std::size_t scope) const {
+    return scopes_[scope].record;
+  }
 
   /// How the tracker errs, one sigma of each axis.
   static constexpr BirdNoise kNoise{0.3, 0.1};
 
  private:
-  void calibrate(std::uint64_t seed);
+  struct Scope {
+    CameraModel lens;
+    Transform<Camera, Sensor> camera_from_sensor;
+    calibration::CalibrationRecord record;
+  };
+  static Scope calibrated(const CameraModel& lens, const Transform<Camera, Sensor>& found, std::uint64_t seed);
   [[nodiscard]] double on_its_way_s(double at_s) const;
   [[nodiscard]] Transform<Camera, Patient> camera_within_patient(double at_s) const;
 
@@ -82,12 +97,11 @@ class OperationTruth {
   std::optional<BenchPath> bench_;
   double left_board_s_ = std::numeric_limits<double>::infinity();
   Transform<Tracker, Patient> at_rest_;  ///< tracker_from_patient before anything befell
-  Transform<Camera, Sensor> camera_from_sensor_;
   Transform<Patient, Sensor> patient_from_reference_{Eigen::Matrix3d::Identity(), {40, 90, -10}};
-  CameraModel lens_;
+  std::array<Scope, 2> scopes_;
+  std::vector<double> exchanged_at_s_;
   Eigen::Vector3d tip_in_pointer_mm_{0, 0, 150}, target_mm_;
   std::vector<Eigen::Vector3d> fiducials_mm_;
-  calibration::CalibrationRecord record_;
 };
 
 }  // namespace birdseye::hw_sim

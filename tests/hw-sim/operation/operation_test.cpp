@@ -45,6 +45,10 @@ TEST(Operation, WithoutAFaultTheOverlayIsWholeOnceThePatientIsRegistered) {
   EXPECT_GT(out.laws.frames, 25 * 115U);
 }
 
+Fault usual(FaultKind kind, double at_s, double for_s, std::map<std::string, double, std::less<>> values = {}) {
+  return {kind, at_s, for_s, std::move(values)};
+}
+
 FaultScript programs_end(std::vector<Fault> faults) {
   FaultScript script;
   script.programs = std::move(faults);
@@ -71,6 +75,32 @@ TEST(Operation, AWindowThatIsOpenedAgainTakesUpWhatWasFoundAndAsksForALandmark) 
   const OperationOutcome again = operate({.seed = 11, .minutes = 2, .faults = script});
   EXPECT_EQ(out.log, again.log) << "its files are read in no time at all";
   EXPECT_EQ(out.hash, again.hash);
+}
+
+/// Twenty seconds of video come three seconds late, and then what had piled up.
+TEST(Operation, ASlowNetworkBringsNoOldOverlay) {
+  const auto script = programs_end({usual(FaultKind::link_late, 45, 20, {{"ms", 3000}})});
+  const OperationOutcome out = operate({.seed = 11, .minutes = 2, .faults = script});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.registrations, 1U) << out.log;
+  EXPECT_GT(static_cast<double>(out.laws.green), 0.5 * static_cast<double>(out.laws.shown)) << out.log;
+}
+
+TEST(Operation, AnotherScopeIsDrawnWithByItsOwnRecord) {
+  const auto script =
+      programs_end({usual(FaultKind::scope_exchanged, 45, 4), usual(FaultKind::scope_exchanged, 80, 4)});
+  const OperationOutcome out = operate({.seed = 11, .minutes = 2, .faults = script});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.registrations, 1U) << "a scope has no part in it\n" << out.log;
+  EXPECT_GT(static_cast<double>(out.laws.green), 0.6 * static_cast<double>(out.laws.shown)) << out.log;
+  EXPECT_EQ(out.laws.beyond, 0U);
+}
+
+TEST(Operation, AScopeWithoutARecordIsNotExchanged) {
+  const auto script = programs_end({usual(FaultKind::scope_exchanged, 45, 4)});
+  const auto out = run_operation({.seed = kSeedAtBoard, .minutes = 1, .faults = script, .pictures = true});
+  ASSERT_FALSE(out);
+  EXPECT_NE(out.error().what.find("give another seed"), std::string::npos) << out.error().what;
 }
 
 TEST(Operation, FaultsAtRandomBreakNoLaw) {
@@ -102,7 +132,12 @@ TEST(Operation, TheReferenceIsTheOneAskedForOrElseTheSeeds) {
 class MendedSeed : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(MendedSeed, BreaksNoLawAnyMore) {
-  const OperationOutcome out = operate({.seed = GetParam(), .minutes = 10, .programs_end = false, .disk_fails = false});
+  const OperationOutcome out = operate({.seed = GetParam(),
+                                        .minutes = 10,
+                                        .programs_end = false,
+                                        .disk_fails = false,
+                                        .link_is_late = false,
+                                        .scopes_change = false});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
@@ -119,17 +154,14 @@ INSTANTIATE_TEST_SUITE_P(Operation, MendedSeed, ::testing::Values(4, 17, 85, 104
 class MendedSeedOfPrograms : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(MendedSeedOfPrograms, BreaksNoLawAnyMore) {
-  const OperationOutcome out = operate({.seed = GetParam(), .minutes = 10, .disk_fails = false});
+  const OperationOutcome out =
+      operate({.seed = GetParam(), .minutes = 10, .disk_fails = false, .link_is_late = false, .scopes_change = false});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
 INSTANTIATE_TEST_SUITE_P(Operation, MendedSeedOfPrograms,
                          ::testing::Values(106, 168, 229, 260, 1307, 1477, 66263737, 66263751, 206351423),
                          [](const auto& of) { return std::to_string(of.param); });
-
-Fault usual(FaultKind kind, double at_s, double for_s, std::map<std::string, double, std::less<>> values = {}) {
-  return {kind, at_s, for_s, std::move(values)};
-}
 
 /// A law was wrong: one byte lost and another's bit turned over made a record of pieces of two, 5.2 mm off where 4.0
 /// were allowed. A hand might have moved so.
@@ -144,7 +176,8 @@ TEST(Operation, MendedSeed2021HasARecordOfPiecesOfTwo) {
 /// A law was wrong: it looked ten times a second, and took for lost what a first touch anew had dropped just before the
 /// power went.
 TEST(Operation, MendedSeed108797437DroppedItsRegistrationItself) {
-  const OperationOutcome out = operate({.seed = 108797437, .minutes = 10});
+  const OperationOutcome out =
+      operate({.seed = 108797437, .minutes = 10, .link_is_late = false, .scopes_change = false});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
@@ -152,7 +185,8 @@ TEST(Operation, MendedSeed108797437DroppedItsRegistrationItself) {
 /// back meanwhile.
 TEST(Operation, MendedSeedsTouchedAnewBeforeTheReferenceWasKnown) {
   for (const auto& [seed, minutes] : {std::pair{260668121U, 6.0}, {145140002U, 9.0}}) {
-    const OperationOutcome out = operate({.seed = seed, .minutes = minutes});
+    const OperationOutcome out =
+        operate({.seed = seed, .minutes = minutes, .link_is_late = false, .scopes_change = false});
     EXPECT_TRUE(out.broken.empty()) << told(out);
   }
 }
@@ -233,6 +267,16 @@ TEST(OperationWithPictures, ViewsAreKeptAndTheCtIsMatchedWithThem) {
   EXPECT_EQ(out.laws.beyond, 0U);
 }
 
+/// It was found by views of the former scope.
+TEST(OperationWithPictures, ADeformationIsNotTakenUpWithAnotherScope) {
+  const auto script = programs_end({usual(FaultKind::window_restart, 50, 8), usual(FaultKind::scope_exchanged, 51, 6)});
+  const OperationOutcome out = operate({.seed = 3, .minutes = 1.5, .faults = script, .pictures = true});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.deformations, 1U) << out.log;
+  EXPECT_EQ(out.registrations, 1U) << out.log;
+  EXPECT_GT(out.log.rfind("the overlay is whole"), out.log.find("ends: program window_restart")) << out.log;
+}
+
 /// The window that is opened again takes up the calibration too.
 TEST(OperationWithPictures, AScopeIsCalibratedOverABoardAndTheOverlayIsAsGoodAsItSays) {
   const OperationOutcome out = operate({.seed = kSeedAtBoard,
@@ -265,7 +309,8 @@ TEST(OperationWithPictures, PlacesThatAreWornAccuseNobody) {
 
 /// Places that had been followed wrongly, and were fewer than a third, accused the poses at 216 s.
 TEST(OperationWithPictures, MendedSeed33AccusesNobody) {
-  const OperationOutcome out = operate({.seed = 33, .minutes = 4, .disk_fails = false, .pictures = true});
+  const OperationOutcome out = operate(
+      {.seed = 33, .minutes = 4, .disk_fails = false, .link_is_late = false, .scopes_change = false, .pictures = true});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
@@ -440,7 +485,8 @@ TEST(OperationFaults, EveryFaultOfAnInstrumentCanBefall) {
     const FaultScript script = draw_faults(seed, 0, 3600, true);
     for (const Fault& fault : script.tracker) drawn.push_back("tracker " + std::string(fault_name(fault.kind)));
     for (const Fault& fault : script.camera) drawn.push_back("camera " + std::string(fault_name(fault.kind)));
-    for (const auto& faults : {draw_program_faults(seed, 0, 3600), draw_disk_faults(seed, 0, 3600)})
+    for (const auto& faults : {draw_program_faults(seed, 0, 3600), draw_link_faults(seed, 0, 3600),
+                               draw_scope_exchanges(seed, 0, 3600), draw_disk_faults(seed, 0, 3600)})
       for (const Fault& fault : faults) drawn.push_back("program " + std::string(fault_name(fault.kind)));
   }
   for (const FaultSpec& spec : fault_table()) {
