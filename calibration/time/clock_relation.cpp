@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace birdseye {
 namespace {
@@ -22,6 +23,24 @@ double ClockRelation::sigma_at(std::int64_t device_ns) const {
   const double spread =
       std::sqrt(level_sigma_ns_ * level_sigma_ns_ + slope_sigma_ * slope_sigma_ * from_s * from_s + bend_ns * bend_ns);
   return std::max(spread, 0.5 * static_cast<double>(bound_.ns));
+}
+
+/// Of the exchange that leaves least open at that time. The line through all of them leaves its bounds where many
+/// exchanges were slow in the same way, as over a network that is slow in one direction.
+ClockRelation::Offset ClockRelation::related_at(std::int64_t device_ns) const {
+  constexpr double kSurely = 4;  // sigmas
+  double middle_ns = 0, half_ns = std::numeric_limits<double>::infinity();
+  for (const Sample& sample : samples_) {
+    const double since_s = static_cast<double>(device_ns - sample.device_ns) * 1e-9;
+    const double bend_ns = settings_.wander_ppm_per_s * 1e3 * since_s * since_s / 2;
+    const double open_ns = sample.half_ns + kSurely * std::hypot(slope_sigma_ * since_s, bend_ns);
+    if (open_ns >= half_ns) continue;
+    half_ns = open_ns;
+    middle_ns = static_cast<double>(sample.offset_ns - anchor_offset_ns_) + slope_ * since_s;
+  }
+  const double offset_ns = std::clamp(offset_at(device_ns), middle_ns - half_ns, middle_ns + half_ns);
+  const double farthest_ns = std::abs(offset_ns - middle_ns) + half_ns;
+  return {anchor_offset_ns_ + std::llround(offset_ns), std::llround(std::max(sigma_at(device_ns), 0.5 * farthest_ns))};
 }
 
 bool ClockRelation::contradicts(const Sample& sample) const {
@@ -96,16 +115,16 @@ void ClockRelation::refit() {
 
 std::optional<RelatedTime<HostTime>> ClockRelation::host_from_device(DeviceTime time) const {
   if (samples_.empty()) return std::nullopt;
-  return RelatedTime<HostTime>{{time.ns + anchor_offset_ns_ + std::llround(offset_at(time.ns))},
-                               {std::llround(sigma_at(time.ns))}};
+  const Offset offset = related_at(time.ns);
+  return RelatedTime<HostTime>{{time.ns + offset.ns}, {offset.sigma_ns}};
 }
 
 std::optional<RelatedTime<DeviceTime>> ClockRelation::device_from_host(HostTime time) const {
   if (samples_.empty()) return std::nullopt;
   // The offset changes by parts per million of itself: twice is to the nanosecond.
   std::int64_t device_ns = time.ns - anchor_offset_ns_;
-  for (int i = 0; i < 3; ++i) device_ns = time.ns - anchor_offset_ns_ - std::llround(offset_at(device_ns));
-  return RelatedTime<DeviceTime>{{device_ns}, {std::llround(sigma_at(device_ns))}};
+  for (int i = 0; i < 3; ++i) device_ns = time.ns - related_at(device_ns).ns;
+  return RelatedTime<DeviceTime>{{device_ns}, {related_at(device_ns).sigma_ns}};
 }
 
 std::vector<ClockEvent> ClockRelation::take_events() {

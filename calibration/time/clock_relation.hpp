@@ -26,7 +26,8 @@ struct RelatedTime {
 /// anywhere within plus and minus half its round trip, for nobody knows how the two ways share it; the narrowest
 /// exchanges give the narrowest bounds. A constant asymmetry shows in no number of exchanges. So sigma is never less
 /// than half of the best half round trip: an even distribution within the bounds has a sigma of 0.58 of the half round
-/// trip, and a way there that takes three times as long as the way back is off by just one sigma.
+/// trip, and a way there that takes three times as long as the way back is off by just one sigma. The truth is at most
+/// two sigmas away, however the ways share their time.
 class ClockRelation {
  public:
   struct Settings {
@@ -56,7 +57,11 @@ class ClockRelation {
     std::int64_t offset_ns = 0;  ///< host - device, as if both ways took the same time
     double half_ns = 0;          ///< half of what the two ways took together
   };
+  struct Offset {
+    std::int64_t ns = 0, sigma_ns = 0;  ///< host - device
+  };
   void refit();
+  [[nodiscard]] Offset related_at(std::int64_t device_ns) const;
   [[nodiscard]] bool contradicts(const Sample& sample) const;
   [[nodiscard]] double offset_at(std::int64_t device_ns) const;
   [[nodiscard]] double sigma_at(std::int64_t device_ns) const;

@@ -97,7 +97,10 @@ std::optional<wire::Event> LiveSource::next(Deadline deadline) {
     return std::nullopt;
   }
   auto event = events_->next(deadline);
-  if (event) return *std::move(event);
+  if (event) {
+    if (recording_ != nullptr) note_played(*event);
+    return *std::move(event);
+  }
   words_ = event.error().what + notes();
   events_.reset();
   stream_ = nullptr;
@@ -105,6 +108,11 @@ std::optional<wire::Event> LiveSource::next(Deadline deadline) {
   again_ = host_now() + kConnectAgain;
   given_up_ = cart_ != nullptr || !live_;
   return std::nullopt;
+}
+
+void LiveSource::note_played(const std::optional<wire::Event>& event) {
+  const auto* const frame = event ? std::get_if<wire::VideoFrame>(&*event) : nullptr;
+  if (frame != nullptr) played_ = ClockGap{frame->info.acquired, {host_now(), {}}};
 }
 
 void LiveSource::link_again() {
@@ -133,7 +141,7 @@ std::string LiveSource::notes() const {
 }
 
 std::optional<ClockGap> LiveSource::host_from_device() const {
-  return stream_ != nullptr ? stream_->host_from_device() : std::nullopt;
+  return stream_ != nullptr ? stream_->host_from_device() : played_;
 }
 
 }  // namespace birdseye::host

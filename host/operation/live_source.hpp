@@ -43,6 +43,8 @@ class LiveSource {
   void retry();
   /// Connected to what, or why not, in words.
   [[nodiscard]] std::string words() const;
+  /// By the newest frame; empty until that is known. Of a recording a frame is as old as if it had been exposed as it
+  /// is played.
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;
   /// The simulated cart, once it runs.
   [[nodiscard]] SimulatedCart* cart() const { return cart_.get(); }
@@ -57,6 +59,7 @@ class LiveSource {
   LiveSource(std::string name, Connect::Work connect);
   void take_link(Result<Connection> link);
   void link_again();
+  void note_played(const std::optional<wire::Event>& event);
   [[nodiscard]] std::string notes() const;
 
   std::string name_, words_;
@@ -68,6 +71,7 @@ class LiveSource {
   std::unique_ptr<EventSource> events_;
   EventStream* stream_ = nullptr;               ///< events_, where they come over the wire
   const RecordingReader* recording_ = nullptr;  ///< events_, where they are recorded
+  std::optional<ClockGap> played_;              ///< the newest frame of a recording
   bool live_ = true;
 };
 

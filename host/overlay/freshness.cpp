@@ -11,7 +11,7 @@ namespace birdseye::host {
 Exposure exposure_of(const std::optional<RelatedTime<HostTime>>& stamped, Duration stamp_sigma, HostTime arrived) {
   constexpr std::int64_t kSurely = 3;  // sigmas
   constexpr Duration kClockReads = Duration::from_ms(1);
-  if (!stamped) return {arrived, {}, {}};
+  if (!stamped) return {arrived, {}, words("why_clocks_unrelated")};
   const Duration sigma = in_quadrature(stamped->sigma, stamp_sigma), ahead = stamped->time - arrived;
   if (ahead.ns > kSurely * sigma.ns + kClockReads.ns)
     return {arrived, {}, words("why_stamp_ahead", ahead.seconds() * 1e3)};

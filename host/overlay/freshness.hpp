@@ -36,9 +36,9 @@ struct Exposure {
   std::string doubt{};  ///< why its stamp is not believed, in words: it must not carry an overlay; empty: it is
 };
 
-/// stamped: where the clocks' relation has the frame's stamp; empty: the clocks are not related yet. stamp_sigma: of
-/// the stamp. A frame that was exposed after it arrived, by more than both sigmas allow, has a wrong stamp: by it video
-/// that has stopped would seem fresh.
+/// stamped: where the clocks' relation has the frame's stamp; empty: the clocks are not related yet, and a frame that
+/// has just come may be of any age. stamp_sigma: of the stamp. A frame that was exposed after it arrived, by more than
+/// both sigmas allow, has a wrong stamp: by it video that has stopped would seem fresh.
 Exposure exposure_of(const std::optional<RelatedTime<HostTime>>& stamped, Duration stamp_sigma, HostTime arrived);
 
 /// pose_age: how old the newest measurement behind the frame's pose was at the exposure; not above zero where the pose

@@ -437,6 +437,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_stopped_now", "the video has stopped"},
     {"why_old_picture", "the picture is {:.0f} ms old"},
     {"why_old_pose", "the newest pose is {:.0f} ms old"},
+    {"why_clocks_unrelated", "the appliance has not told its time yet: how old the picture is is not known"},
     {"why_stamp_ahead", "the frames' stamps lie {:.0f} ms ahead of the clock: how old they are is not known"},
     {"why_no_video", "no video has come yet"},
     {"why_next_picture", "the next picture is awaited"},

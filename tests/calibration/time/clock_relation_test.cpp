@@ -72,6 +72,27 @@ TEST(ClockRelation, SigmaCoversRandomAndLopsidedDelays) {
   EXPECT_GT(within_2 / count, 0.97);
 }
 
+/// Answers pile up in a network that is slow in one direction, and come all at once: each was a little quicker than the
+/// one before, and all are slow in the same way. Then it is quick again.
+TEST(ClockRelation, TheTruthIsWithinTwoSigmasAlsoWhereOneWayIsSlow) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Network network(seed);
+    network.queue_ms = 0.02;
+    network.drift_ppm = std::normal_distribution<double>(0, 40)(network.rng);
+    const double late_s = std::uniform_real_distribution<double>(0.02, 4)(network.rng), over_s = 7;
+    ClockRelation relation;
+    for (int i = 0; i < 200; ++i) {
+      const double at_s = 0.1 * i;
+      network.back_ms = 0.2 + 1e3 * (at_s < over_s ? late_s : std::max(0.0, over_s + late_s - at_s));
+      EXPECT_TRUE(relation.push(network.exchange(at_s)));
+      const auto related = relation.host_from_device(Network::device_at(at_s));
+      const double error_ms = std::abs((related->time - network.host_at(at_s)).seconds()) * 1e3;
+      EXPECT_LE(error_ms, 2e3 * related->sigma.seconds() + 1e-3) << seed << ", " << at_s << " s";
+    }
+    EXPECT_LT(std::abs(network.error_ms(relation, 20)), 0.3) << seed;
+  }
+}
+
 TEST(ClockRelation, ThereAndBackIsTheSame) {
   Network network(3);
   ClockRelation relation;

@@ -30,7 +30,7 @@ class Doubted : public ::testing::Test {
     wire::VideoFrame frame;
     for (const std::int64_t ms : {0, 20'000}) {
       frame.info.acquired = DeviceTime{ms * birdseye::testing::kMs};
-      workflow_.take(frame, HostTime{frame.info.acquired.ns}, std::nullopt);
+      workflow_.take(frame, HostTime{frame.info.acquired.ns}, ClockGap{});
     }
     ASSERT_FALSE(drawn());
     ASSERT_EQ(workflow_.view().step, LiveStep::check);
@@ -134,7 +134,7 @@ TEST_F(Doubted, AreTouchesThatGaveNoRegistrationYet) {
   wire::VideoFrame frame;
   for (const std::int64_t ms : {0, 20'000}) {
     frame.info.acquired = DeviceTime{ms * birdseye::testing::kMs};
-    workflow_.take(frame, HostTime{frame.info.acquired.ns}, std::nullopt);
+    workflow_.take(frame, HostTime{frame.info.acquired.ns}, ClockGap{});
   }
   EXPECT_TRUE(workflow_.view().touches.empty());
   EXPECT_NE(workflow_.view().note(LiveStep::fiducials).line.find("touch all fiducials anew"), std::string::npos);

@@ -92,7 +92,7 @@ wire::VideoFrame frame_at(const LiveWorkflow& workflow, int at_s, double beside_
 }
 
 ShownPicture shown_after(LiveWorkflow& workflow, int at_s) {
-  workflow.take(frame_at(workflow, at_s), HostTime{at_s * 1000 * kMs}, std::nullopt);
+  workflow.take(frame_at(workflow, at_s), HostTime{at_s * 1000 * kMs}, ClockGap{});
   workflow.draw();
   return workflow.shown_at(HostTime{at_s * 1000 * kMs});
 }
@@ -179,7 +179,7 @@ TEST_F(DeformedOperation, SpaceLeavesTheMatchingAloneAndAKeyOfItsOwnCancelsIt) {
     auto noise = std::make_shared<std::vector<std::uint8_t>>(frame.rgb->size());
     for (std::uint8_t& byte : *noise) byte = static_cast<std::uint8_t>(random());
     frame.rgb = noise;
-    workflow.take(frame, HostTime{n * 1000 * kMs}, std::nullopt);
+    workflow.take(frame, HostTime{n * 1000 * kMs}, ClockGap{});
     workflow.primary(HostTime{0});
   }
   ASSERT_EQ(workflow.view().note(LiveStep::views).line, "2 views kept");

@@ -59,7 +59,15 @@ TEST(Freshness, OfAStampAheadOfTheClockTheArrivalCounts) {
   EXPECT_EQ(freshness_at(arrived, ahead, Duration::from_ms(510), {}).why_too_old, ahead.doubt)
       << "it is the stamp that makes the pose look old";
   EXPECT_TRUE(freshness_at(arrived + Duration::from_ms(301), ahead, {}, {}).stopped);
-  EXPECT_EQ(exposure_of(std::nullopt, sigma, arrived).at.ns, arrived.ns);
+}
+
+TEST(Freshness, APictureBearsNoOverlayBeforeTheClocksAreRelated) {
+  const HostTime arrived{5'000'000'000};
+  const Exposure unknown = exposure_of(std::nullopt, Duration::from_ms(2), arrived);
+  EXPECT_EQ(unknown.at.ns, arrived.ns);
+  EXPECT_EQ(freshness_at(arrived, unknown, {}, {}).why_too_old,
+            "the appliance has not told its time yet: how old the picture is is not known");
+  EXPECT_TRUE(freshness_at(arrived + Duration::from_ms(301), unknown, {}, {}).stopped);
 }
 
 }  // namespace

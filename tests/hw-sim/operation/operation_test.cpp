@@ -86,6 +86,16 @@ TEST(Operation, ASlowNetworkBringsNoOldOverlay) {
   EXPECT_GT(static_cast<double>(out.laws.green), 0.5 * static_cast<double>(out.laws.shown)) << out.log;
 }
 
+/// Seed 1. What came over the new connection was taken to be as young as it had come, until the appliance had told its
+/// time: pictures two seconds old had an overlay.
+TEST(Operation, ANewConnectionOverASlowNetworkBringsNoOldOverlay) {
+  const auto script =
+      programs_end({usual(FaultKind::link_late, 45, 12, {{"ms", 1975}}), {FaultKind::link_cut, 47, {}, {}}});
+  const OperationOutcome out = operate({.seed = 11, .minutes = 1.5, .faults = script});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_NE(out.log.find("the appliance has not told its time yet"), std::string::npos) << out.log;
+}
+
 TEST(Operation, AnotherScopeIsDrawnWithByItsOwnRecord) {
   const auto script =
       programs_end({usual(FaultKind::scope_exchanged, 45, 4), usual(FaultKind::scope_exchanged, 80, 4)});
