@@ -8,7 +8,7 @@
 namespace birdseye::hw_sim {
 
 std::string_view fault_name(FaultKind kind) {
-  static constexpr std::array<std::string_view, 40> kNames{
+  static constexpr std::array<std::string_view, 41> kNames{
       "drop_byte",        "duplicate_byte", "corrupt_byte",    "wrong_phase_bit",   "line_noise",
       "stuck_stream",     "frozen_pose",    "saturated",       "zero_matrix",       "hemisphere_flip",
       "metal_distortion", "power_cycle",    "drift_step",      "lost_record",       "unplug",
@@ -16,7 +16,8 @@ std::string_view fault_name(FaultKind kind) {
       "duplicate_frames", "garbage",        "size_change",     "torn_frame",        "transmitter_bumped",
       "bed_tilted",       "patient_moved",  "reference_moved", "breathing",         "resected",
       "lens_zoomed",      "scope_turned",   "link_cut",        "appliance_restart", "window_restart",
-      "scope_exchanged",  "link_late",      "disk_late",       "disk_full",         "power_cut"};
+      "scope_exchanged",  "link_late",      "window_stalls",   "disk_late",         "disk_full",
+      "power_cut"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 

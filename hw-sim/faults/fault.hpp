@@ -51,6 +51,7 @@ enum class FaultKind {
   window_restart,
   scope_exchanged,
   link_late,
+  window_stalls,
   disk_late,
   disk_full,
   power_cut,

@@ -64,6 +64,7 @@ constexpr FaultSpec kTable[] = {
     {FaultKind::window_restart, false, false, false, true, WithoutEnd::refused, {}},
     {FaultKind::scope_exchanged, false, false, false, true, WithoutEnd::refused, {}},
     {FaultKind::link_late, false, false, false, true, WithoutEnd::refused, kDelayMs},
+    {FaultKind::window_stalls, false, false, false, true, WithoutEnd::refused, {}},
     {FaultKind::disk_late, false, false, false, true, WithoutEnd::refused, kDelayMs},
     {FaultKind::disk_full, false, false, false, true, WithoutEnd::refused, {}},
     {FaultKind::power_cut, false, false, false, true, WithoutEnd::refused, kCut},

@@ -345,6 +345,12 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
       surgeon.stand_at(workflow, journal.at_s(host_now()));
       laws.opened(surgeon.checks());
     }
+    if (befalling.active(FaultKind::window_stalls) != nullptr) {
+      sleep_for(kScreen);
+      announcer.tell(journal, host_now());
+      laws.stood_still();
+      continue;
+    }
     take_events(source, workflow, laws, journal);
     workflow.set_link(source.connected(), source.words(), source.may_retry());
     workflow.tick();
@@ -396,12 +402,14 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
     if (operation.disk_fails)
       std::ranges::move(draw_disk_faults(operation.seed, kFaultsFrom_s, until_s),
                         std::back_inserter(out.faults.programs));
-    if (operation.link_is_late)
-      std::ranges::move(draw_link_faults(operation.seed, kFaultsFrom_s, until_s),
-                        std::back_inserter(out.faults.programs));
-    if (operation.scopes_change && !at_board)
-      std::ranges::move(draw_scope_exchanges(operation.seed, kFaultsFrom_s, until_s),
-                        std::back_inserter(out.faults.programs));
+    if (operation.more_befalls) {
+      const auto add = [](std::vector<Fault>& to, std::vector<Fault> more) {
+        std::ranges::move(more, std::back_inserter(to));
+      };
+      add(out.faults.programs, draw_delays(operation.seed, kFaultsFrom_s, until_s));
+      if (!at_board) add(out.faults.programs, draw_scope_exchanges(operation.seed, kFaultsFrom_s, until_s));
+      if (reference) add(out.faults.world, draw_tilts(operation.seed, kFaultsFrom_s, until_s));
+    }
     if (operation.pictures && !reference) draw_bumps_in_view(operation.seed, kFaultsFrom_s, until_s, out.faults);
   }
   const VideoSize size = at_board ? kOfBoard : operation.pictures ? kPictures : kGrey;

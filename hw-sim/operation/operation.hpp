@@ -19,10 +19,11 @@ struct SimulatedOperation {
   std::optional<FaultScript> faults{};  ///< what befalls; none: drawn by the seed
   bool programs_end = true;             ///< drawn faults also cut the network, and end programs and start them again
   bool disk_fails = true;               ///< and the disk of the window's machine is late, is full, or loses power
-  bool link_is_late = true;             ///< and the network is slow
-  bool scopes_change = true;            ///< and the scope is exchanged for another, which has a record of its own
-  std::optional<bool> reference{};      ///< a reference bird is fixed on the patient; none: the seed decides
-  bool pictures = false;                ///< the video shows what the scope sees; else it is grey all over, and small
+  /// And the network is slow, the window stands still, the table is tilted, and the scope is exchanged for another,
+  /// which has a record of its own.
+  bool more_befalls = true;
+  std::optional<bool> reference{};  ///< a reference bird is fixed on the patient; none: the seed decides
+  bool pictures = false;            ///< the video shows what the scope sees; else it is grey all over, and small
 };
 
 /// What came of it.

@@ -68,7 +68,12 @@ constexpr DrawnFault kDrawnOfPrograms[] = {
     {FaultKind::window_restart, kProgram, 1, 10},
 };
 
-constexpr DrawnFault kDrawnOfLink[] = {{FaultKind::link_late, kProgram, 1, 20, "ms", 20, 3000}};
+constexpr DrawnFault kDrawnDelays[] = {
+    {FaultKind::link_late, kProgram, 1, 20, "ms", 20, 3000},
+    {FaultKind::window_stalls, kProgram, 0.1, 6},
+};
+
+constexpr DrawnFault kDrawnTilts[] = {{FaultKind::bed_tilted, kWorld, 10, 90, "deg", -15, 15}};
 
 constexpr DrawnFault kDrawnOfScopes[] = {{FaultKind::scope_exchanged, kProgram, 2, 20}};
 
@@ -223,9 +228,16 @@ std::vector<Fault> draw_scope_exchanges(std::uint64_t seed, double from_s, doubl
   return faults;
 }
 
-std::vector<Fault> draw_link_faults(std::uint64_t seed, double from_s, double until_s) {
+std::vector<Fault> draw_delays(std::uint64_t seed, double from_s, double until_s) {
   std::vector<Fault> faults;
-  draw(kDrawnOfLink, hashed_word(seed, 14), 150, from_s, until_s,
+  draw(kDrawnDelays, hashed_word(seed, 14), 100, from_s, until_s,
+       [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
+  return faults;
+}
+
+std::vector<Fault> draw_tilts(std::uint64_t seed, double from_s, double until_s) {
+  std::vector<Fault> faults;
+  draw(kDrawnTilts, hashed_word(seed, 15), 200, from_s, until_s,
        [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
   return faults;
 }

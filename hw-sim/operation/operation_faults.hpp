@@ -41,8 +41,10 @@ FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool 
 void draw_bumps_in_view(std::uint64_t seed, double from_s, double until_s, FaultScript& befalls);
 /// What befalls the programs: the network is cut, the appliance or the window ends and is started again.
 std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double until_s);
-/// The network is slow from the appliance to the window.
-std::vector<Fault> draw_link_faults(std::uint64_t seed, double from_s, double until_s);
+/// The network is slow from the appliance to the window, or the window stands still.
+std::vector<Fault> draw_delays(std::uint64_t seed, double from_s, double until_s);
+/// With a reference bird: the table is tilted.
+std::vector<Fault> draw_tilts(std::uint64_t seed, double from_s, double until_s);
 /// The scope is exchanged for another, and for the first again.
 std::vector<Fault> draw_scope_exchanges(std::uint64_t seed, double from_s, double until_s);
 /// What befalls the machine of the window: its disk is late, or full, or its power is cut.

@@ -183,10 +183,14 @@ void OperationLaws::opened(std::size_t checks) {
   accused_ = false;
   to_take_up_ = !kept_.empty();
   board_to_take_up_ = board_kept_;
+  stood_still();
+  checks_when_opened_ = to_take_up_ ? std::optional(checks) : std::nullopt;
+}
+
+void OperationLaws::stood_still() {
   may_calibrate_since_s_.reset();
   ready_since_s_.reset();
   unsaid_since_s_.reset();
-  checks_when_opened_ = to_take_up_ ? std::optional(checks) : std::nullopt;
 }
 
 void OperationLaws::take(const host::OperationView& view, std::size_t checks, HostTime now) {

@@ -49,6 +49,8 @@ class OperationLaws {
   void take(const wire::Event& event, HostTime now);
   /// The window was opened.
   void opened(std::size_t checks);
+  /// The window stands still: what it has to do within a time begins anew.
+  void stood_still();
   /// What the window says. checks: how often a landmark has been checked.
   void take(const host::OperationView& view, std::size_t checks, HostTime now);
   /// The same, of a disk on which so many syncs have failed so far. powerless: it keeps nothing more.

@@ -86,6 +86,23 @@ TEST(Operation, ASlowNetworkBringsNoOldOverlay) {
   EXPECT_GT(static_cast<double>(out.laws.green), 0.5 * static_cast<double>(out.laws.shown)) << out.log;
 }
 
+/// What had come meanwhile is taken at once; none of it is live.
+TEST(Operation, AWindowThatStoodStillBringsNoOldOverlay) {
+  const auto script = programs_end({usual(FaultKind::window_stalls, 45, 0.4), usual(FaultKind::window_stalls, 50, 8)});
+  const OperationOutcome out = operate({.seed = 11, .minutes = 1.5, .faults = script});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.registrations, 1U) << out.log;
+  EXPECT_GT(static_cast<double>(out.laws.green), 0.6 * static_cast<double>(out.laws.shown)) << out.log;
+}
+
+TEST(Operation, ATableThatIsTiltedTakesTheReferenceAlong) {
+  FaultScript script;
+  script.world = {{FaultKind::bed_tilted, 45, 20.0, {{"deg", 15}, {"over_s", 3}}}};
+  const OperationOutcome out = operate({.seed = 11, .minutes = 1.5, .faults = script, .reference = true});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.registrations, 1U) << out.log;
+}
+
 /// Seed 1. What came over the new connection was taken to be as young as it had come, until the appliance had told its
 /// time: pictures two seconds old had an overlay.
 TEST(Operation, ANewConnectionOverASlowNetworkBringsNoOldOverlay) {
@@ -142,12 +159,8 @@ TEST(Operation, TheReferenceIsTheOneAskedForOrElseTheSeeds) {
 class MendedSeed : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(MendedSeed, BreaksNoLawAnyMore) {
-  const OperationOutcome out = operate({.seed = GetParam(),
-                                        .minutes = 10,
-                                        .programs_end = false,
-                                        .disk_fails = false,
-                                        .link_is_late = false,
-                                        .scopes_change = false});
+  const OperationOutcome out =
+      operate({.seed = GetParam(), .minutes = 10, .programs_end = false, .disk_fails = false, .more_befalls = false});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
@@ -164,8 +177,7 @@ INSTANTIATE_TEST_SUITE_P(Operation, MendedSeed, ::testing::Values(4, 17, 85, 104
 class MendedSeedOfPrograms : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(MendedSeedOfPrograms, BreaksNoLawAnyMore) {
-  const OperationOutcome out =
-      operate({.seed = GetParam(), .minutes = 10, .disk_fails = false, .link_is_late = false, .scopes_change = false});
+  const OperationOutcome out = operate({.seed = GetParam(), .minutes = 10, .disk_fails = false, .more_befalls = false});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
@@ -186,8 +198,7 @@ TEST(Operation, MendedSeed2021HasARecordOfPiecesOfTwo) {
 /// A law was wrong: it looked ten times a second, and took for lost what a first touch anew had dropped just before the
 /// power went.
 TEST(Operation, MendedSeed108797437DroppedItsRegistrationItself) {
-  const OperationOutcome out =
-      operate({.seed = 108797437, .minutes = 10, .link_is_late = false, .scopes_change = false});
+  const OperationOutcome out = operate({.seed = 108797437, .minutes = 10, .more_befalls = false});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
@@ -195,8 +206,7 @@ TEST(Operation, MendedSeed108797437DroppedItsRegistrationItself) {
 /// back meanwhile.
 TEST(Operation, MendedSeedsTouchedAnewBeforeTheReferenceWasKnown) {
   for (const auto& [seed, minutes] : {std::pair{260668121U, 6.0}, {145140002U, 9.0}}) {
-    const OperationOutcome out =
-        operate({.seed = seed, .minutes = minutes, .link_is_late = false, .scopes_change = false});
+    const OperationOutcome out = operate({.seed = seed, .minutes = minutes, .more_befalls = false});
     EXPECT_TRUE(out.broken.empty()) << told(out);
   }
 }
@@ -319,8 +329,8 @@ TEST(OperationWithPictures, PlacesThatAreWornAccuseNobody) {
 
 /// Places that had been followed wrongly, and were fewer than a third, accused the poses at 216 s.
 TEST(OperationWithPictures, MendedSeed33AccusesNobody) {
-  const OperationOutcome out = operate(
-      {.seed = 33, .minutes = 4, .disk_fails = false, .link_is_late = false, .scopes_change = false, .pictures = true});
+  const OperationOutcome out =
+      operate({.seed = 33, .minutes = 4, .disk_fails = false, .more_befalls = false, .pictures = true});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
@@ -495,7 +505,7 @@ TEST(OperationFaults, EveryFaultOfAnInstrumentCanBefall) {
     const FaultScript script = draw_faults(seed, 0, 3600, true);
     for (const Fault& fault : script.tracker) drawn.push_back("tracker " + std::string(fault_name(fault.kind)));
     for (const Fault& fault : script.camera) drawn.push_back("camera " + std::string(fault_name(fault.kind)));
-    for (const auto& faults : {draw_program_faults(seed, 0, 3600), draw_link_faults(seed, 0, 3600),
+    for (const auto& faults : {draw_program_faults(seed, 0, 3600), draw_delays(seed, 0, 3600),
                                draw_scope_exchanges(seed, 0, 3600), draw_disk_faults(seed, 0, 3600)})
       for (const Fault& fault : faults) drawn.push_back("program " + std::string(fault_name(fault.kind)));
   }
