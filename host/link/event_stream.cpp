@@ -11,6 +11,12 @@ namespace {
 constexpr Duration kLook = Duration::from_ms(100);  // how soon a stop is seen
 }  // namespace
 
+std::optional<DeviceTime> acquired_of(const wire::Event& event) {
+  if (const auto* frame = std::get_if<wire::VideoFrame>(&event)) return frame->info.acquired;
+  if (const auto* birds = std::get_if<wire::Birds>(&event)) return birds->acquired;
+  return std::nullopt;
+}
+
 EventStream::EventStream(std::unique_ptr<wire::Client> client, std::size_t most_frames)
     : client_(std::move(client)),
       plain_(client_->is_plain()),
@@ -49,11 +55,10 @@ void EventStream::read(const std::stop_token& stop) {
 }
 
 std::optional<ClockGap> EventStream::gap_at(const wire::Event& event) const {
-  const auto* frame = std::get_if<wire::VideoFrame>(&event);
-  if (frame == nullptr) return std::nullopt;
-  const auto related = client_->host_from_device(frame->info.acquired);
+  const auto acquired = acquired_of(event);
+  const auto related = acquired ? client_->host_from_device(*acquired) : std::nullopt;
   if (!related) return std::nullopt;
-  return ClockGap{frame->info.acquired, *related};
+  return ClockGap{*acquired, *related};
 }
 
 std::optional<ClockGap> EventStream::host_from_device() const {

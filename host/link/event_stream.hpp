@@ -22,6 +22,9 @@ struct ClockGap {
   [[nodiscard]] HostTime host_from_device(DeviceTime time) const { return host.time + (time - at); }
 };
 
+/// When what a frame or a pose shows was so; empty of other events.
+std::optional<DeviceTime> acquired_of(const wire::Event& event);
+
 /// Reads the wire on a thread of its own, so that work on one frame does not make the appliance shed the next. Bounded:
 /// past most_frames waiting, the oldest frame is dropped; the frames' own sequence numbers show the gap. Poses have a
 /// bound of their own, and so has what is seldom (Pedal, Calibration, Status ...): neither costs a pedal press.
@@ -31,7 +34,7 @@ class EventStream : public EventSource {
 
   /// The next event; empty at the deadline; an error once the appliance has gone and all its events are taken.
   Result<std::optional<wire::Event>> next(Deadline deadline) override;
-  /// By the newest frame; empty until that is known.
+  /// By the newest frame or pose; empty until that is known.
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;
   /// For a server that is no appliance: what it is, and which of its messages are passed over. Empty for an appliance.
   [[nodiscard]] std::string peer_words() const;

@@ -111,8 +111,8 @@ std::optional<wire::Event> LiveSource::next(Deadline deadline) {
 }
 
 void LiveSource::note_played(const std::optional<wire::Event>& event) {
-  const auto* const frame = event ? std::get_if<wire::VideoFrame>(&*event) : nullptr;
-  if (frame != nullptr) played_ = ClockGap{frame->info.acquired, {host_now(), {}}};
+  const auto acquired = event ? acquired_of(*event) : std::nullopt;
+  if (acquired) played_ = ClockGap{*acquired, {host_now(), {}}};
 }
 
 void LiveSource::link_again() {

@@ -43,8 +43,8 @@ class LiveSource {
   void retry();
   /// Connected to what, or why not, in words.
   [[nodiscard]] std::string words() const;
-  /// By the newest frame; empty until that is known. Of a recording a frame is as old as if it had been exposed as it
-  /// is played.
+  /// By the newest frame or pose; empty until that is known. What a recording has is as old as if it had come about as
+  /// it is played.
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;
   /// The simulated cart, once it runs.
   [[nodiscard]] SimulatedCart* cart() const { return cart_.get(); }
@@ -71,7 +71,7 @@ class LiveSource {
   std::unique_ptr<EventSource> events_;
   EventStream* stream_ = nullptr;               ///< events_, where they come over the wire
   const RecordingReader* recording_ = nullptr;  ///< events_, where they are recorded
-  std::optional<ClockGap> played_;              ///< the newest frame of a recording
+  std::optional<ClockGap> played_;              ///< the newest frame or pose of a recording
   bool live_ = true;
 };
 

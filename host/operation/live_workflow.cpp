@@ -108,7 +108,7 @@ void LiveWorkflow::use_reference(const std::string& name) {
 
 void LiveWorkflow::take_relative(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock) {
   if (const auto* frame = std::get_if<wire::VideoFrame>(&event)) {
-    note_pause(now);
+    note_pause(now, video_came_, true);
     watch_motion(*frame);
     if (!frozen_) {
       std::optional<RelatedTime<HostTime>> stamped;
@@ -119,7 +119,7 @@ void LiveWorkflow::take_relative(const wire::Event& event, HostTime now, const s
       watch_surface(now);
     }
   } else if (const auto* birds = std::get_if<wire::Birds>(&event)) {
-    take(*birds);
+    take_birds(*birds, now, clock);
   } else if (const auto* health = std::get_if<wire::Health>(&event)) {
     connection_.take(*health);
     instruments_.take(*health);
@@ -135,10 +135,11 @@ void LiveWorkflow::take_relative(const wire::Event& event, HostTime now, const s
   }
 }
 
-void LiveWorkflow::take(const wire::Birds& birds) {
+void LiveWorkflow::take_birds(const wire::Birds& birds, HostTime now, const std::optional<ClockGap>& clock) {
   const auto& setup = picture_.setup();
   for (const wire::Bird& bird : birds.birds) {
     if (bird.name != settings_.scope) continue;
+    note_pause(now, scope_came_, fiducials_.registered_or_held_back().has_value());
     views_.take(birds.acquired, bird.tracker_from_sensor);
     video_.take(birds.acquired, bird.tracker_from_sensor);
     if (!setup || !patient_.plan()) continue;
@@ -147,9 +148,16 @@ void LiveWorkflow::take(const wire::Birds& birds) {
   }
   const auto& tip_mm = settings_.tip_in_pointer_mm ? settings_.tip_in_pointer_mm : record_tip_in_pointer_mm_;
   if (!tip_mm) return;
+  // What comes late over a slow network tells where the pointer was, which may be before a step began.
+  const auto was = clock ? std::optional(clock->host_from_device(birds.acquired) - Duration{2 * clock->host.sigma.ns})
+                         : std::nullopt;
+  if (!was || now - *was > kPointerIsSeen) {
+    pointer_ = {};
+    return;
+  }
   const auto rested = pointer_.take(birds, settings_.pointer, *tip_mm);
   for (const wire::Bird& bird : birds.birds)
-    if (bird.name == settings_.pointer) pointer_heard_ = heard_;
+    if (bird.name == settings_.pointer) pointer_was_ = was;
   const auto registered = fiducials_.registered();
   for (const wire::Bird& bird : birds.birds) {
     if (bird.name != settings_.pointer || !strokes_.stroking() || !registered) continue;
@@ -222,6 +230,7 @@ void LiveWorkflow::fit() {
 void LiveWorkflow::forget_views(const std::string& why) {
   check_ = run_ = {};  // they were of the setup that is no more
   checked_.reset();
+  checked_off_mm_.reset();
   const bool touched = strokes_.stroking() || strokes_.places() > 0;
   if (views_.views().empty() && !touched && !deformation_.found() && !deformation_.running()) return;
   views_.forget(why);
@@ -231,6 +240,7 @@ void LiveWorkflow::forget_views(const std::string& why) {
 
 void LiveWorkflow::show_shape() {
   checked_.reset();
+  checked_off_mm_.reset();
   ++shapes_;
   watch_.forget();
   motion_ = {};
@@ -270,6 +280,7 @@ void LiveWorkflow::update_setup() {
   const DeformedOrgan* const deformed = deformation_.found().get();
   figures.target_in_patient_mm = as_shown_mm(target_in_patient_mm(*patient_.plan()), deformed);
   if (deformed != nullptr) figures.motion_error = deformed->target;
+  if (checked_off_mm_ && figures.target_mm) figures.target_mm = std::max(*figures.target_mm, *checked_off_mm_);
   figures.moved_mm = motion_.moved_mm();
   video_.enter(figures);
   if (!settings_.video_must_agree) figures.video.reset();

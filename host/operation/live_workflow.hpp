@@ -123,7 +123,7 @@ class LiveWorkflow {
   /// Of what is used that no known machine signed.
   void tell_unsigned(OperationView& view) const;
   [[nodiscard]] std::string why_primary_refused() const;
-  void take(const wire::Birds& birds);
+  void take_birds(const wire::Birds& birds, HostTime now, const std::optional<ClockGap>& clock);
   void take(const wire::Calibration& calibration);
   void fit();
   [[nodiscard]] std::string lost_with_registration() const;
@@ -131,7 +131,8 @@ class LiveWorkflow {
   [[nodiscard]] bool asks_for_instruments() const;
   void judge_instruments();
   void follow_held_back();
-  void note_pause(HostTime now);
+  /// A frame or a pose has come; came: when the one before did. counts: what was found by then is in doubt.
+  void note_pause(HostTime now, std::optional<HostTime>& came, bool counts);
   [[nodiscard]] bool asks_for_patient() const;
   [[nodiscard]] bool is_other_patients() const;
   void forget_views(const std::string& why);
@@ -149,6 +150,7 @@ class LiveWorkflow {
   void check_registration();
   void check_undoubted(const std::optional<CheckReading>& reading);
   void check_in_doubt(const CheckReading& reading);
+  void count_as_off(double off_mm);
   void refuse_registration(const CheckReading& by);
   void confirm_registration(const std::optional<CheckReading>& by);
   void watch_surface(HostTime now);
@@ -162,6 +164,7 @@ class LiveWorkflow {
   bool frozen_ = false, patient_confirmed_ = false;
   bool simulated_ = false;              ///< nobody lies there
   std::optional<HostTime> video_came_;  ///< the newest frame
+  std::optional<HostTime> scope_came_;  ///< the scope's newest pose
   ConnectedInstruments instruments_;
   PictureHardware taken_with_;
   ReferenceSensor reference_;
@@ -182,11 +185,12 @@ class LiveWorkflow {
   PlacePicks picks_;
   std::string pick_line_;
   PointerTip pointer_;
-  HostTime heard_{};                           ///< now, as it was last told
-  std::optional<HostTime> first_heard_;        ///< of this connection
-  std::optional<HostTime> pointer_heard_;      ///< when the pointer was
-  std::optional<Eigen::Vector3d> fits_at_mm_;  ///< in doubt, the first place at which it fits; patient frame
-  std::size_t landmarks_before_doubt_ = 0;     ///< that were known as the registration came into doubt
+  HostTime heard_{};                        ///< now, as it was last told
+  std::optional<HostTime> first_heard_;     ///< of this connection
+  std::optional<HostTime> pointer_was_;     ///< where it was seen last: when, at the earliest
+  std::optional<CheckReading> fits_at_;     ///< in doubt, the first place at which it fits
+  std::optional<double> checked_off_mm_;    ///< by how much the registration was off where it was checked
+  std::size_t landmarks_before_doubt_ = 0;  ///< that were known as the registration came into doubt
   FiducialStep fiducials_;
   std::optional<std::size_t> asked_to_take_back_;
   ViewStep views_;

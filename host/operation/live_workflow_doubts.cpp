@@ -34,10 +34,10 @@ void LiveWorkflow::take(ReferenceSensor::News news) {
 
 /// Patient or transmitter may have been moved while nobody saw it: only a landmark tells. A reference sees it, and says
 /// so where it was lost meanwhile.
-void LiveWorkflow::note_pause(HostTime now) {
-  const bool paused = video_came_ && now - *video_came_ > kPause;
-  video_came_ = now;
-  if (paused && !reference_.in_use()) doubt_registration("");
+void LiveWorkflow::note_pause(HostTime now, std::optional<HostTime>& came, bool counts) {
+  const bool paused = came && now - *came > kPause;
+  came = now;
+  if (paused && counts && !reference_.in_use()) doubt_registration("");
 }
 
 void LiveWorkflow::doubt_registration(const std::string& why) {
@@ -45,7 +45,7 @@ void LiveWorkflow::doubt_registration(const std::string& why) {
   why_doubted_ = why;
   fiducials_.doubt();
   pointer_ = {};  // where it was before tells nothing of what has moved since
-  fits_at_mm_.reset();
+  fits_at_.reset();
   landmarks_before_doubt_ = patient_.landmarks().size();
   if (!fiducials_.registered_or_held_back()) return update_setup();
   run_ = {};
@@ -82,7 +82,7 @@ void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
   if (news.again && !fiducials_.suspected()) {
     fiducials_.suspect();
     if (fiducials_.suspected()) pointer_ = {};
-    fits_at_mm_.reset();
+    fits_at_.reset();
   }
   if (news.motion && video_.motion() == VideoAgreement::agrees && fiducials_.suspected()) doubt_registration("");
   if (news.motion) update_setup();
@@ -143,7 +143,10 @@ void LiveWorkflow::check_undoubted(const std::optional<CheckReading>& reading) {
     landmarks_before_doubt_ = patient_.landmarks().size();
     return refuse_registration(*reading);
   }
-  if (pointed_at && !reading->fitted) return confirm_registration(*reading);
+  if (pointed_at && !reading->fitted) {
+    confirm_registration(*reading);
+    return count_as_off(reading->distance_mm);
+  }
   if (!checked_) check_.line = words("note_unchecked");
   confirm_registration(std::nullopt);
 }
@@ -153,17 +156,27 @@ void LiveWorkflow::check_undoubted(const std::optional<CheckReading>& reading) {
 void LiveWorkflow::check_in_doubt(const CheckReading& reading) {
   constexpr double kApart_mm = 30;  // the two places
   if (reading.distance_mm > kMostCheckedOff_mm) return refuse_registration(reading);
-  if (fits_at_mm_ && (*fits_at_mm_ - reading.nearest_mm).norm() >= kApart_mm) return confirm_registration(reading);
+  if (fits_at_ && (fits_at_->nearest_mm - reading.nearest_mm).norm() >= kApart_mm) {
+    const double first_off_mm = fits_at_->distance_mm;
+    confirm_registration(reading);
+    return count_as_off(std::max(first_off_mm, reading.distance_mm));
+  }
   if (!reading.fitted) checked_ = {reading.nearest, reading.distance_mm};
-  if (!fits_at_mm_) fits_at_mm_ = reading.nearest_mm;
+  if (!fits_at_) fits_at_ = reading;
   check_ = {false, words("note_check_second", reading.distance_mm, reading.nearest)};
+}
+
+/// Where it was seen to be off by more than is to be expected the circle is as large as that.
+void LiveWorkflow::count_as_off(double off_mm) {
+  checked_off_mm_ = off_mm;
+  update_setup();
 }
 
 void LiveWorkflow::refuse_registration(const CheckReading& by) {
   why_doubted_ = words("note_check_off", by.distance_mm, by.nearest);
   check_ = {false, why_doubted_};
   checked_.reset();
-  fits_at_mm_.reset();
+  fits_at_.reset();
   fiducials_.doubt();
   update_setup();
 }
@@ -173,7 +186,7 @@ void LiveWorkflow::confirm_registration(const std::optional<CheckReading>& by) {
   if (by && !by->fitted) checked_ = {by->nearest, by->distance_mm};
   check_ = {true, by ? words("note_checked", by->distance_mm, by->nearest) : check_.line};
   fiducials_.confirm();
-  fits_at_mm_.reset();
+  fits_at_.reset();
   why_doubted_.clear();
   update_setup();
   go_to(LiveStep::run);

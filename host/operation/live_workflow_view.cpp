@@ -94,7 +94,8 @@ OperationView LiveWorkflow::view() const {
   if (registered) out.fre_mm = registered->fre_mm;
   out.registration_fault = fiducials_.fault();
   out.unconfirmed = !fiducials_.confirmed();
-  out.fits_at_one = fits_at_mm_.has_value();
+  out.fits_at_one = fits_at_.has_value();
+  out.registration_held_back = fiducials_.held_back() && fiducials_.registered_or_held_back().has_value();
   out.deforming = deformation_.running();
   if (step_ == LiveStep::deform) out.deform_progress = deformation_.progress();
   out.deformed = deformation_.found();
@@ -133,8 +134,7 @@ std::optional<Touch> LiveWorkflow::pointer_held() const {
 }
 
 bool LiveWorkflow::pointer_is_seen() const {
-  constexpr Duration kMoment = Duration::from_ms(500);
-  return pointer_heard_ && heard_ - *pointer_heard_ < kMoment;
+  return pointer_was_ && heard_ - *pointer_was_ < kPointerIsSeen;
 }
 
 /// In doubt only places count that were known before: one that is picked where the tip is shown proves nothing.

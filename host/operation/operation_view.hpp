@@ -32,6 +32,7 @@ struct OperationView {
   bool guiding = false;
   bool fits_at_one = false;  ///< in doubt, it fits at one place: another is asked for
   bool unconfirmed = false;  ///< the registration is an earlier window's, and nobody has looked whether it holds
+  bool registration_held_back = false;  ///< what the fiducials gave, as long as other instruments are there
   bool deforming = false;
   bool stroking = false;            ///< the pointer, over the organ
   bool organ_moved = false;         ///< since the views that the deformation was found by

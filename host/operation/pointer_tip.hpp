@@ -11,6 +11,9 @@
 
 namespace birdseye::host {
 
+/// What was seen longer ago tells nothing of where the tip is.
+inline constexpr Duration kPointerIsSeen = Duration::from_ms(500);
+
 /// Follows the tip of the tracked pointer: where it is, and where it rests.
 class PointerTip {
  public:

@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "calibration/base/units.hpp"
 #include "device/wire/json.hpp"
 #include "host/texts/texts.hpp"
 #include "hw-sim/faults/fault_table.hpp"
@@ -19,9 +21,12 @@ namespace {
 
 constexpr double kSigmas = 6;
 constexpr double kQuantum_mm = 0.06;    // half a count in 914 mm, per axis, and rounding
+constexpr double kQuantum_deg = 0.02;   // of a matrix's words, and rounding
 constexpr double kTimeLimit_s = 0.010;  // of [pose] max_time_sigma_ms: what TDATA promises
 constexpr double kMostAge_ms = 150;
 constexpr double kMostCircles = 3, kPromisedCircles = 1.5;
+constexpr double kMostBeyond = 0.001;  // of whole overlays, by more than the latter
+constexpr std::uint64_t kFewestGreen = 10'000;
 constexpr double kNamedWithin_s = 2, kOverWithin_s = 2;
 constexpr double kTakesUpWithin_s = 2;  // once the instruments are those that it was registered with
 constexpr double kCalm_s = 10;          // after a fault's end what it had the window see may still be weighed
@@ -40,6 +45,10 @@ double speed_mm_s(const OperationTruth& truth, std::size_t bird, double at_s) {
     most = std::max(most, (to - from).norm() / kStep_s);
   }
   return most;
+}
+
+double degrees_between(const Eigen::Matrix3d& one, const Eigen::Matrix3d& other) {
+  return Eigen::AngleAxisd(Eigen::Matrix3d(one.transpose() * other)).angle() * kDegPerRad;
 }
 
 /// On the operation's clock. Infinite: it lasts for good.
@@ -112,9 +121,31 @@ void OperationLaws::judge_pose(const char* of, std::size_t bird, const Transform
     break_law(now_s, "pose", fmt::format("{} is {:.1f} mm off where it may be {:.1f}", of, off_mm, may_mm));
 }
 
+/// Of a bird's pose as it is published; of a frame's nothing is said of how well it is turned.
+void OperationLaws::judge_turn(const wire::Bird& bird, double true_s, double now_s) {
+  for (const Span& span : spans_) {
+    const bool world = span.of == FaultTarget::world;
+    if (!world && !span.signs.lies && span.signs.extra_mm == 0 && span.signs.extra_s == 0) continue;
+    if (true_s > span.begins_s - kLinger_s &&
+        true_s < span.ends_s + kLinger_s + (world ? span.fault.value("over_s") : 0))
+      return;
+  }
+  const std::size_t number = bird_of(bird.name);
+  const auto truth = [&](double at_s) { return truth_.tracker_from_sensor(number, at_s).rotation(); };
+  const double off_deg = degrees_between(truth(true_s), bird.tracker_from_sensor.rotation());
+  constexpr double kStep_s = 0.01;
+  const double may_deg =
+      kSigmas * std::sqrt(3.0) * OperationTruth::kNoise.angle_deg + kQuantum_deg +
+      degrees_between(truth(true_s - kStep_s), truth(true_s + kStep_s)) / (2 * kStep_s) * kTimeLimit_s;
+  if (off_deg > may_deg)
+    break_law(now_s, "pose",
+              fmt::format("{} is turned by {:.2f} degrees where it may be by {:.2f}", bird.name, off_deg, may_deg));
+}
+
 void OperationLaws::take(const wire::Birds& birds, double now_s) {
   for (const wire::Bird& bird : birds.birds) {
     ++figures_.poses;
+    judge_turn(bird, at_s(birds.acquired.ns), now_s);
     judge_pose(bird.name.c_str(), bird_of(bird.name), bird.tracker_from_sensor, at_s(birds.acquired.ns), now_s, 0,
                kTimeLimit_s);
     if (bird.name != "scope") continue;
@@ -267,7 +298,8 @@ void OperationLaws::take_kept(const host::OperationView& view, std::uint64_t fai
   // What a window has not taken up yet is there all the same.
   if (!to_take_up_) {
     const std::optional<Found> found = found_in(view, now_s);
-    if (all_kept || !found) kept_.clear();
+    // Nobody has taken back what is held back.
+    if ((all_kept || !found) && !view.registration_held_back) kept_.clear();
     if (found && std::ranges::count(kept_, *found) == 0 && (all_kept || !kept_.empty())) kept_.push_back(*found);
   }
   if (std::exchange(failed_syncs_, failed_syncs) < failed_syncs && !unsaid_since_s_) unsaid_since_s_ = now_s;
@@ -384,6 +416,12 @@ void OperationLaws::judge(const Span& span, double until_s) {
 }
 
 void OperationLaws::finish(double until_s) {
+  if (static_cast<double>(figures_.beyond) >
+      kMostBeyond * static_cast<double>(std::max(figures_.green, kFewestGreen))) {
+    break_law(until_s, "circle",
+              fmt::format("{} of {} whole overlays are off by more than {} circles", figures_.beyond, figures_.green,
+                          kPromisedCircles));
+  }
   for (const Span& span : spans_) {
     // One that lasts for good is named all the same.
     const bool ends = std::isfinite(span.ends_s);

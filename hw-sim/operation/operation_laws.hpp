@@ -24,10 +24,12 @@ struct BrokenLaw {
 
 /// What must hold of an operation at any moment, whatever befalls it.
 ///
-/// - pose: no pose is given as good that is off by more than 6 sigma of what it says of itself.
+/// - pose: no pose is given as good that is off by more than 6 sigma of what it says of itself, nor one of a bird that
+///   is turned by more than 6 sigma of the tracker's noise.
 /// - age: no overlay is on the screen whose frame was exposed more than 150 ms ago.
 /// - setup: no overlay is drawn with the calibration of a scope that is not the one in use.
-/// - circle: no overlay is shown as whole that is off by more than three circles. Without a reference, this is not
+/// - circle: no overlay is shown as whole that is off by more than three circles, and of a thousand one at most by more
+///   than one and a half. Without a reference, this is not
 ///   asked of frames that are exposed while transmitter or patient move and 0.1 s after; and where they move while no
 ///   overlay of a registered patient is whole, nothing is watched that could show it: not before the window asks for a
 ///   landmark, or the patient is registered anew.
@@ -97,6 +99,7 @@ class OperationLaws {
   void break_law(double at_s, const char* law, std::string what);
   void judge_pose(const char* of, std::size_t bird, const Transform<Tracker, Sensor>& told, double true_s, double now_s,
                   double own_mm, double time_s);
+  void judge_turn(const wire::Bird& bird, double true_s, double now_s);
   void take(const wire::Birds& birds, double now_s);
   void take(const wire::VideoFrame& frame, double now_s);
   void take(const wire::Health& health, double now_s);

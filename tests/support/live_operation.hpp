@@ -73,7 +73,7 @@ class Hand {
     time_ms_ += 10;
     birds.birds.push_back(
         {"pointer", Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), tip_mm - Eigen::Vector3d(0, 0, 150))});
-    workflow_.take(birds, HostTime{birds.acquired.ns}, std::nullopt);
+    workflow_.take(birds, HostTime{birds.acquired.ns}, host::ClockGap{});
   }
   LiveWorkflow& workflow_;
   Eigen::Vector3d at_mm_ = Eigen::Vector3d(0, 0, 900);

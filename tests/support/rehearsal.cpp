@@ -210,7 +210,7 @@ void Rehearsal::push_birds() {
     // A frame's pose is that of the bird that is called the scope.
     if (name == "scope") history_.push(acquired, kPoseSigma, bird->tracker_from_sensor);
   }
-  workflow_->take(birds, HostTime{acquired.ns}, std::nullopt);
+  workflow_->take(birds, HostTime{acquired.ns}, host::ClockGap{});
 }
 
 /// A hundredth of a second goes by; every fourth there is a frame.

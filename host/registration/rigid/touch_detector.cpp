@@ -49,9 +49,11 @@ std::optional<Touch> TouchDetector::push(DeviceTime acquired, const Eigen::Vecto
   while (acquired - window_.front().acquired > settings_.window) window_.pop_front();
   constexpr std::size_t kFewest = 8;
   const bool spans = (acquired - window_.front().acquired).seconds() > 0.8 * settings_.window.seconds();
-  if (!spans || window_.size() < kFewest) return std::nullopt;
+  const bool followed = spans && window_.size() >= kFewest;
+  if (!followed && rest_.empty()) return std::nullopt;
 
-  if (window_is_still()) {
+  // Where it was not seen for a while it may have been anywhere: a rest ends there.
+  if (followed && window_is_still()) {
     if (rest_.empty()) {
       rest_.insert(rest_.end(), window_.begin(), window_.end());
     } else {

@@ -17,7 +17,8 @@ struct Touch {
 
 /// Finds the points at which a tracked tip rests. The tip is at rest while a line fitted to its positions over `window`
 /// moves by less than `still_mm`: a line averages the tracker's noise, which the spread of positions would not. A touch
-/// is reported when the tip leaves. A rest before the tip's first move does not count.
+/// is reported when the tip leaves, or is seen again after it was not for most of a window. A rest before the tip's
+/// first move does not count.
 class TouchDetector {
  public:
   struct Settings {

@@ -90,6 +90,60 @@ TEST_F(Doubted, IsNotConfirmedByAPointerThatIsNotSeenAnyMore) {
   EXPECT_NE(said().find("the pointer is not seen"), std::string::npos) << said();
 }
 
+/// Over a slow network: where the pointer was is not where it is.
+TEST_F(Doubted, IsNeitherConfirmedNorTouchedByAPointerThatComesLate) {
+  pause();
+  const auto late_at = [&](const Eigen::Vector3d& in_patient_mm, std::int64_t from_ms) {
+    for (std::int64_t ms = from_ms; ms < from_ms + 800; ms += 10) {
+      wire::Birds birds;
+      birds.acquired = DeviceTime{ms * birdseye::testing::kMs};
+      const Eigen::Vector3d sensor_mm =
+          birdseye::testing::kTrackerFromPatient * in_patient_mm - Eigen::Vector3d(0, 0, 150);
+      birds.birds.push_back({"pointer", Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), sensor_mm)});
+      workflow_.take(birds, HostTime{(ms + 600) * birdseye::testing::kMs}, ClockGap{});
+    }
+  };
+  late_at(kTumour, 21'000);
+  workflow_.primary(HostTime{22'400 * birdseye::testing::kMs});
+  EXPECT_FALSE(drawn());
+  EXPECT_NE(said().find("the pointer is not seen"), std::string::npos) << said();
+  workflow_.go_to(LiveStep::fiducials);
+  const std::size_t before = workflow_.view().touches.size();
+  late_at(kFiducials[0], 23'000);
+  late_at(kFiducials[1], 24'000);
+  EXPECT_EQ(workflow_.view().touches.size(), before);
+}
+
+/// The tracker was away, and the video went on.
+TEST_F(Doubted, IsARegistrationWhoseScopeWasNotSeenForAWhile) {
+  wire::Birds birds;
+  birds.birds.push_back({"scope", Transform<Tracker, Sensor>()});
+  for (std::int64_t ms = 0; ms <= 20'000; ms += 1000) {
+    const bool tracked = ms == 0 || ms == 20'000;
+    ASSERT_TRUE(drawn()) << ms;
+    wire::VideoFrame frame;
+    frame.info.acquired = birds.acquired = DeviceTime{ms * birdseye::testing::kMs};
+    workflow_.take(frame, HostTime{frame.info.acquired.ns}, ClockGap{});
+    if (tracked) workflow_.take(birds, HostTime{frame.info.acquired.ns}, ClockGap{});
+  }
+  EXPECT_FALSE(drawn());
+  EXPECT_EQ(workflow_.view().step, LiveStep::check);
+}
+
+/// What a person has seen to be off by so much is not expected to be off by less.
+TEST_F(Doubted, IsConfirmedNoBetterThanItsLandmarksFit) {
+  const auto expected_mm = [&] { return workflow_.picture().figures().target_mm.value_or(0); };
+  const double by_touches_mm = expected_mm();
+  ASSERT_LT(by_touches_mm, 1);
+  pause();
+  confirm(workflow_, {0, 0, 6});
+  ASSERT_TRUE(drawn()) << said();
+  EXPECT_NEAR(expected_mm(), 6, 0.5);
+  pause();
+  confirm(workflow_);
+  EXPECT_NEAR(expected_mm(), by_touches_mm, 0.5) << "the last look counts";
+}
+
 TEST_F(Doubted, IsBegunAnewByThePedalInTheStepOfFiducials) {
   pause();
   workflow_.go_to(LiveStep::fiducials);

@@ -278,7 +278,7 @@ class Referenced : public ::testing::Test {
   }
   void measure() {
     room_.time_ms += 10;
-    workflow_->take(room_.birds(), HostTime{room_.time_ms * kMs}, std::nullopt);
+    workflow_->take(room_.birds(), HostTime{room_.time_ms * kMs}, ClockGap{});
   }
   /// Poses every 10 ms, and frames every 40 that look at the patient's middle.
   void pass(

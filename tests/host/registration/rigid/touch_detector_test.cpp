@@ -50,6 +50,27 @@ TEST(TouchDetector, FindsEachRestOnceAndNotTheParkingPlace) {
   }
 }
 
+/// Nothing is seen of it while it goes from one place to the next.
+TEST(TouchDetector, ARestEndsWhereTheTipIsNotSeen) {
+  const Eigen::Vector3d park(400, 100, 50), first(200, 0, 0), second(260, 10, 0);
+  TouchDetector detector;
+  std::vector<Touch> touches;
+  double t_s = 0;
+  const auto rest = [&](const Eigen::Vector3d& at_mm) {
+    for (int k = 0; k < 80; ++k, t_s += 1 / kRateHz)
+      if (const auto touch = detector.push({Duration::from_seconds(t_s).ns}, at_mm)) touches.push_back(*touch);
+  };
+  for (const Eigen::Vector3d& place : {park, first, second, park}) {
+    rest(place);
+    for (int k = 0; k < 20 && place == park; ++k, t_s += 1 / kRateHz)
+      (void)detector.push({Duration::from_seconds(t_s).ns}, park + (first - park) * (k / 20.0));
+    t_s += 0.5;
+  }
+  ASSERT_EQ(touches.size(), 2U);
+  EXPECT_LT((touches[0].tip_in_tracker_mm - first).norm(), 0.01);
+  EXPECT_LT((touches[1].tip_in_tracker_mm - second).norm(), 0.01);
+}
+
 TEST(TouchDetector, AShortStopIsNoTouch) {
   EXPECT_TRUE(run({{200, 0, 0}}, 0.3, 0.1).empty());
 }
