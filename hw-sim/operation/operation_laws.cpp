@@ -22,6 +22,7 @@ namespace {
 constexpr double kSigmas = 6;
 constexpr double kQuantum_mm = 0.06;    // half a count in 914 mm, per axis, and rounding
 constexpr double kQuantum_deg = 0.02;   // of a matrix's words, and rounding
+constexpr double kTrackHolds_s = 0.1;   // a reading after a longer hole is believed once the next agrees
 constexpr double kTimeLimit_s = 0.010;  // of [pose] max_time_sigma_ms: what TDATA promises
 constexpr double kMostAge_ms = 150;
 constexpr double kMostCircles = 3, kPromisedCircles = 1.5;
@@ -78,6 +79,9 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
       if (&other == &span || other.signs.aside) continue;
       const bool together = other.begins_s < span.ends_s && other.ends_s > span.begins_s;
       if (together && span.signs.shifts_bytes && other.signs.shifts_bytes) span.signs.extra_mm = kUnseenChange_mm;
+      // The first record of a frozen bird that gets through is like one of a hand that stopped in the hole before it.
+      const bool loses = other.signs.shifts_bytes || other.fault.kind == FaultKind::lost_record;
+      if (together && span.fault.kind == FaultKind::frozen_pose && loses) span.signs.extra_s = kTrackHolds_s;
       if (other.begins_s < span.ends_s + kAlone_s && other.ends_s > span.begins_s - kAlone_s) span.alone = false;
     }
   }

@@ -222,6 +222,16 @@ TEST(Operation, MendedSeed2021HasARecordOfPiecesOfTwo) {
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
+/// A law was wrong: of a bird that froze in a hole of 80 ms the first record was new, and 4.5 mm off where 4.1 were
+/// allowed. A hand might have stopped so.
+TEST(Operation, MendedSeed2000017HasABirdThatFreezesInAHole) {
+  FaultScript script;
+  script.tracker = {usual(FaultKind::wrong_phase_bit, 286.229, 4.928, {{"chance", 0.601}}),
+                    usual(FaultKind::frozen_pose, 286.624, 1.097)};
+  const OperationOutcome out = operate({.seed = 2000017, .minutes = 4.9, .faults = script});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+}
+
 /// A law was wrong: it looked ten times a second, and took for lost what a first touch anew had dropped just before the
 /// power went.
 TEST(Operation, MendedSeed108797437DroppedItsRegistrationItself) {
