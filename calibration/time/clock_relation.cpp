@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t kMostSamples = 256;
 constexpr int kStepConfirms = 3;
+constexpr double kMostDriftSigmas = 2;
 
 }  // namespace
 
@@ -28,15 +29,14 @@ double ClockRelation::sigma_at(std::int64_t device_ns) const {
 /// Of the exchange that leaves least open at that time. The line through all of them leaves its bounds where many
 /// exchanges were slow in the same way, as over a network that is slow in one direction.
 ClockRelation::Offset ClockRelation::related_at(std::int64_t device_ns) const {
-  constexpr double kSurely = 4;  // sigmas
   double middle_ns = 0, half_ns = std::numeric_limits<double>::infinity();
   for (const Sample& sample : samples_) {
-    const double since_s = static_cast<double>(device_ns - sample.device_ns) * 1e-9;
-    const double bend_ns = settings_.wander_ppm_per_s * 1e3 * since_s * since_s / 2;
-    const double open_ns = sample.half_ns + kSurely * std::hypot(slope_sigma_ * since_s, bend_ns);
+    // By what clocks may differ in rate, and not by the slope, which exchanges that are slow in the same way bend.
+    const double since_s = std::abs(static_cast<double>(device_ns - sample.device_ns)) * 1e-9;
+    const double open_ns = sample.half_ns + kMostDriftSigmas * settings_.drift_sigma_ppm * 1e3 * since_s;
     if (open_ns >= half_ns) continue;
     half_ns = open_ns;
-    middle_ns = static_cast<double>(sample.offset_ns - anchor_offset_ns_) + slope_ * since_s;
+    middle_ns = static_cast<double>(sample.offset_ns - anchor_offset_ns_);
   }
   const double offset_ns = std::clamp(offset_at(device_ns), middle_ns - half_ns, middle_ns + half_ns);
   const double farthest_ns = std::abs(offset_ns - middle_ns) + half_ns;

@@ -27,7 +27,7 @@ struct RelatedTime {
 /// exchanges give the narrowest bounds. A constant asymmetry shows in no number of exchanges. So sigma is never less
 /// than half of the best half round trip: an even distribution within the bounds has a sigma of 0.58 of the half round
 /// trip, and a way there that takes three times as long as the way back is off by just one sigma. The truth is at most
-/// two sigmas away, however the ways share their time.
+/// two sigmas away, however the ways share their time, where the clocks' rates differ by two drift_sigma_ppm at most.
 class ClockRelation {
  public:
   struct Settings {

@@ -157,7 +157,7 @@ void LiveWorkflow::take_birds(const wire::Birds& birds, HostTime now, const std:
   }
   const auto rested = pointer_.take(birds, settings_.pointer, *tip_mm);
   for (const wire::Bird& bird : birds.birds)
-    if (bird.name == settings_.pointer) pointer_was_ = was;
+    if (bird.name == settings_.pointer) pointer_was_ = std::min(*was, now);
   const auto registered = fiducials_.registered();
   for (const wire::Bird& bird : birds.birds) {
     if (bird.name != settings_.pointer || !strokes_.stroking() || !registered) continue;
@@ -211,6 +211,7 @@ void LiveWorkflow::confirm_instruments() {
 }
 
 void LiveWorkflow::fit() {
+  const auto before = fiducials_.registered();
   // Nothing is registered with a CT of which nobody has said whose it is.
   if (patient_confirmed_ || !patient_.plan()) {
     fiducials_.fit(patient_.markers_in_patient_mm(), settings_.fiducials,
@@ -218,6 +219,11 @@ void LiveWorkflow::fit() {
   } else {
     fiducials_.fit(std::nullopt, settings_.fiducials, nullptr);
   }
+  const auto registered = fiducials_.registered();
+  const bool same =
+      before && registered && before->tracker_from_patient.matrix() == registered->tracker_from_patient.matrix();
+  if (!same) off_mm_.clear();
+  scope_came_.reset();  // how long it was away before counts no more
   asked_to_take_back_.reset();
   if (fiducials_.confirmed()) why_doubted_.clear();
   forget_views(words("note_views_touched_anew"));
@@ -230,7 +236,6 @@ void LiveWorkflow::fit() {
 void LiveWorkflow::forget_views(const std::string& why) {
   check_ = run_ = {};  // they were of the setup that is no more
   checked_.reset();
-  checked_off_mm_.reset();
   const bool touched = strokes_.stroking() || strokes_.places() > 0;
   if (views_.views().empty() && !touched && !deformation_.found() && !deformation_.running()) return;
   views_.forget(why);
@@ -240,7 +245,6 @@ void LiveWorkflow::forget_views(const std::string& why) {
 
 void LiveWorkflow::show_shape() {
   checked_.reset();
-  checked_off_mm_.reset();
   ++shapes_;
   watch_.forget();
   motion_ = {};
@@ -280,7 +284,9 @@ void LiveWorkflow::update_setup() {
   const DeformedOrgan* const deformed = deformation_.found().get();
   figures.target_in_patient_mm = as_shown_mm(target_in_patient_mm(*patient_.plan()), deformed);
   if (deformed != nullptr) figures.motion_error = deformed->target;
-  if (checked_off_mm_ && figures.target_mm) figures.target_mm = std::max(*figures.target_mm, *checked_off_mm_);
+  // Where it was seen to be off by more than is to be expected, the circle is as large as that.
+  for (const auto& [place, off_mm] : off_mm_)
+    if (figures.target_mm) figures.target_mm = std::max(*figures.target_mm, off_mm);
   figures.moved_mm = motion_.moved_mm();
   video_.enter(figures);
   if (!settings_.video_must_agree) figures.video.reset();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -150,7 +151,6 @@ class LiveWorkflow {
   void check_registration();
   void check_undoubted(const std::optional<CheckReading>& reading);
   void check_in_doubt(const CheckReading& reading);
-  void count_as_off(double off_mm);
   void refuse_registration(const CheckReading& by);
   void confirm_registration(const std::optional<CheckReading>& by);
   void watch_surface(HostTime now);
@@ -189,7 +189,7 @@ class LiveWorkflow {
   std::optional<HostTime> first_heard_;     ///< of this connection
   std::optional<HostTime> pointer_was_;     ///< where it was seen last: when, at the earliest
   std::optional<CheckReading> fits_at_;     ///< in doubt, the first place at which it fits
-  std::optional<double> checked_off_mm_;    ///< by how much the registration was off where it was checked
+  std::map<std::string, double> off_mm_;    ///< by how much it was off where the pointer was held, by the place's name
   std::size_t landmarks_before_doubt_ = 0;  ///< that were known as the registration came into doubt
   FiducialStep fiducials_;
   std::optional<std::size_t> asked_to_take_back_;

@@ -46,6 +46,7 @@ void LiveWorkflow::doubt_registration(const std::string& why) {
   fiducials_.doubt();
   pointer_ = {};  // where it was before tells nothing of what has moved since
   fits_at_.reset();
+  off_mm_.clear();
   landmarks_before_doubt_ = patient_.landmarks().size();
   if (!fiducials_.registered_or_held_back()) return update_setup();
   run_ = {};
@@ -143,10 +144,8 @@ void LiveWorkflow::check_undoubted(const std::optional<CheckReading>& reading) {
     landmarks_before_doubt_ = patient_.landmarks().size();
     return refuse_registration(*reading);
   }
-  if (pointed_at && !reading->fitted) {
-    confirm_registration(*reading);
-    return count_as_off(reading->distance_mm);
-  }
+  if (pointed_at) off_mm_[reading->nearest] = reading->distance_mm;
+  if (pointed_at && !reading->fitted) return confirm_registration(*reading);
   if (!checked_) check_.line = words("note_unchecked");
   confirm_registration(std::nullopt);
 }
@@ -156,20 +155,11 @@ void LiveWorkflow::check_undoubted(const std::optional<CheckReading>& reading) {
 void LiveWorkflow::check_in_doubt(const CheckReading& reading) {
   constexpr double kApart_mm = 30;  // the two places
   if (reading.distance_mm > kMostCheckedOff_mm) return refuse_registration(reading);
-  if (fits_at_ && (fits_at_->nearest_mm - reading.nearest_mm).norm() >= kApart_mm) {
-    const double first_off_mm = fits_at_->distance_mm;
-    confirm_registration(reading);
-    return count_as_off(std::max(first_off_mm, reading.distance_mm));
-  }
+  off_mm_[reading.nearest] = reading.distance_mm;
+  if (fits_at_ && (fits_at_->nearest_mm - reading.nearest_mm).norm() >= kApart_mm) return confirm_registration(reading);
   if (!reading.fitted) checked_ = {reading.nearest, reading.distance_mm};
   if (!fits_at_) fits_at_ = reading;
   check_ = {false, words("note_check_second", reading.distance_mm, reading.nearest)};
-}
-
-/// Where it was seen to be off by more than is to be expected the circle is as large as that.
-void LiveWorkflow::count_as_off(double off_mm) {
-  checked_off_mm_ = off_mm;
-  update_setup();
 }
 
 void LiveWorkflow::refuse_registration(const CheckReading& by) {
@@ -177,6 +167,7 @@ void LiveWorkflow::refuse_registration(const CheckReading& by) {
   check_ = {false, why_doubted_};
   checked_.reset();
   fits_at_.reset();
+  off_mm_.clear();
   fiducials_.doubt();
   update_setup();
 }
@@ -188,6 +179,7 @@ void LiveWorkflow::confirm_registration(const std::optional<CheckReading>& by) {
   fiducials_.confirm();
   fits_at_.reset();
   why_doubted_.clear();
+  if (by) scope_came_.reset();
   update_setup();
   go_to(LiveStep::run);
 }

@@ -262,7 +262,9 @@ void OperationLaws::judge_registration_kept(const host::OperationView& view, dou
   using host::LiveStep;
   if (!to_take_up_) return;
   const bool asks = view.asks_for_instruments || view.asks_for_patient;
-  const bool ready = !asks && view.note(LiveStep::connect).done && view.note(LiveStep::calibrate).done;
+  // As long as it is not known whether the instruments are the same it is held back, and not lost.
+  const bool ready =
+      !asks && !view.registration_held_back && view.note(LiveStep::connect).done && view.note(LiveStep::calibrate).done;
   if (!ready) return ready_since_s_.reset();
   const double since_s = ready_since_s_.value_or(now_s);
   ready_since_s_ = since_s;

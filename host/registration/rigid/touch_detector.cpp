@@ -62,7 +62,7 @@ std::optional<Touch> TouchDetector::push(DeviceTime acquired, const Eigen::Vecto
     return std::nullopt;
   }
   const bool counts = has_moved_;
-  has_moved_ = true;
+  has_moved_ = has_moved_ || followed;
   if (rest_.empty()) return std::nullopt;
   if (!counts) {
     rest_.clear();

@@ -93,6 +93,29 @@ TEST(ClockRelation, TheTruthIsWithinTwoSigmasAlsoWhereOneWayIsSlow) {
   }
 }
 
+/// Exchanges that are slow in the same way for long bend the line, whatever was known before.
+TEST(ClockRelation, TheTruthIsWithinTwoSigmasAlsoWhereOneWayIsSlowForLong) {
+  for (const double drift_ppm : {-80.0, 0.0, 80.0}) {
+    for (const double late_ms : {3.0, 30.0, 100.0, 130.0}) {
+      for (const bool ramp : {false, true}) {
+        Network network(1);
+        network.queue_ms = 0.02;
+        network.drift_ppm = drift_ppm;
+        ClockRelation relation;
+        for (int i = 0; i < 1400; ++i) {
+          const double at_s = 0.1 * i, since_s = std::max(0.0, at_s - 2);
+          network.back_ms = 0.2 + (since_s > 0 ? late_ms * (ramp ? std::min(1.0, since_s / 60) : 1) : 0);
+          EXPECT_TRUE(relation.push(network.exchange(at_s)));
+          const auto related = relation.host_from_device(Network::device_at(at_s));
+          const double error_ms = std::abs((related->time - network.host_at(at_s)).seconds()) * 1e3;
+          ASSERT_LE(error_ms, 2e3 * related->sigma.seconds() + 1e-3)
+              << drift_ppm << " ppm, " << late_ms << " ms, " << ramp << ", " << at_s << " s";
+        }
+      }
+    }
+  }
+}
+
 TEST(ClockRelation, ThereAndBackIsTheSame) {
   Network network(3);
   ClockRelation relation;

@@ -111,6 +111,8 @@ TEST_F(Doubted, IsNeitherConfirmedNorTouchedByAPointerThatComesLate) {
   const std::size_t before = workflow_.view().touches.size();
   late_at(kFiducials[0], 23'000);
   late_at(kFiducials[1], 24'000);
+  late_at(kFiducials[2], 25'000);
+  late_at(kFiducials[3], 26'000);
   EXPECT_EQ(workflow_.view().touches.size(), before);
 }
 
@@ -139,9 +141,39 @@ TEST_F(Doubted, IsConfirmedNoBetterThanItsLandmarksFit) {
   confirm(workflow_, {0, 0, 6});
   ASSERT_TRUE(drawn()) << said();
   EXPECT_NEAR(expected_mm(), 6, 0.5);
+  workflow_.go_to(LiveStep::check);
+  check_at(workflow_, kFiducials[3]);
+  EXPECT_NEAR(expected_mm(), 6, 0.5) << "the other places are off as they were";
+  auto anew = birdseye::testing::straight_scope_record();
+  anew.hand_eye->camera_from_sensor = Transform<Camera, Sensor>(
+      anew.hand_eye->camera_from_sensor.rotation(),
+      Eigen::Vector3d(anew.hand_eye->camera_from_sensor.translation() + Eigen::Vector3d(0, 0, 1)));
+  birdseye::testing::give_record(workflow_, anew);
+  ASSERT_TRUE(drawn());
+  EXPECT_NEAR(expected_mm(), 6, 0.5) << "another calibration does not register the patient";
   pause();
   confirm(workflow_);
-  EXPECT_NEAR(expected_mm(), by_touches_mm, 0.5) << "the last look counts";
+  EXPECT_NEAR(expected_mm(), by_touches_mm, 0.5) << "the last look at a place counts";
+}
+
+/// The scope lies aside while the fiducials are touched.
+TEST_F(Doubted, IsNotARegistrationThatWasMadeWhileTheScopeWasAway) {
+  wire::Birds birds;
+  birds.birds.push_back({"scope", Transform<Tracker, Sensor>()});
+  const auto seen_at = [&](std::int64_t ms) {
+    birds.acquired = DeviceTime{ms * birdseye::testing::kMs};
+    workflow_.take(birds, HostTime{birds.acquired.ns}, ClockGap{});
+  };
+  seen_at(0);
+  workflow_.go_to(LiveStep::fiducials);
+  workflow_.undo();
+  Hand hand(workflow_);
+  hand.rest_at({0, 0, 200}, 1);
+  hand.rest_at(kFiducials.back(), 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_TRUE(drawn());
+  seen_at(60'000);
+  EXPECT_TRUE(drawn()) << said();
 }
 
 TEST_F(Doubted, IsBegunAnewByThePedalInTheStepOfFiducials) {

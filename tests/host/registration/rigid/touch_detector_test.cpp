@@ -60,6 +60,8 @@ TEST(TouchDetector, ARestEndsWhereTheTipIsNotSeen) {
     for (int k = 0; k < 80; ++k, t_s += 1 / kRateHz)
       if (const auto touch = detector.push({Duration::from_seconds(t_s).ns}, at_mm)) touches.push_back(*touch);
   };
+  rest(park);
+  t_s += 0.4;  // parked on, unseen for a moment
   for (const Eigen::Vector3d& place : {park, first, second, park}) {
     rest(place);
     for (int k = 0; k < 20 && place == park; ++k, t_s += 1 / kRateHz)
