@@ -127,7 +127,11 @@ void OperationLaws::judge_pose(const char* of, std::size_t bird, const Transform
 
 /// Of a bird's pose as it is published; of a frame's nothing is said of how well it is turned.
 void OperationLaws::judge_turn(const wire::Bird& bird, double true_s, double now_s) {
+  double time_s = kTimeLimit_s;
   for (const Span& span : spans_) {
+    // Only a few of its records tell that it is frozen.
+    if (span.fault.kind == FaultKind::frozen_pose && true_s > span.begins_s && true_s < span.ends_s + kLinger_s)
+      time_s = kTrackHolds_s;
     const bool world = span.of == FaultTarget::world;
     if (!world && !span.signs.lies && span.signs.extra_mm == 0 && span.signs.extra_s == 0) continue;
     if (true_s > span.begins_s - kLinger_s &&
@@ -137,10 +141,14 @@ void OperationLaws::judge_turn(const wire::Bird& bird, double true_s, double now
   const std::size_t number = bird_of(bird.name);
   const auto truth = [&](double at_s) { return truth_.tracker_from_sensor(number, at_s).rotation(); };
   const double off_deg = degrees_between(truth(true_s), bird.tracker_from_sensor.rotation());
+  // As speed_mm_s has it.
   constexpr double kStep_s = 0.01;
+  double most_deg_s = 0;
+  for (int step = -2; step < 2; ++step)
+    most_deg_s = std::max(
+        most_deg_s, degrees_between(truth(true_s + step * kStep_s), truth(true_s + (step + 1) * kStep_s)) / kStep_s);
   const double may_deg =
-      kSigmas * std::sqrt(3.0) * OperationTruth::kNoise.angle_deg + kQuantum_deg +
-      degrees_between(truth(true_s - kStep_s), truth(true_s + kStep_s)) / (2 * kStep_s) * kTimeLimit_s;
+      kSigmas * std::sqrt(3.0) * OperationTruth::kNoise.angle_deg + kQuantum_deg + most_deg_s * time_s;
   if (off_deg > may_deg)
     break_law(now_s, "pose",
               fmt::format("{} is turned by {:.2f} degrees where it may be by {:.2f}", bird.name, off_deg, may_deg));

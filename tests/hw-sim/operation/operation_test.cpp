@@ -245,6 +245,12 @@ TEST(Operation, MendedSeed2000017HasABirdThatFreezesInAHole) {
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
+/// A law was wrong: a pointer that froze as it turned was 1.7 degrees off before its records told of it.
+TEST(Operation, MendedSeed2000503HasAPointerThatFreezesAsItTurns) {
+  const OperationOutcome out = operate({.seed = 2000503, .minutes = 6.5});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+}
+
 /// A law was wrong: it looked ten times a second, and took for lost what a first touch anew had dropped just before the
 /// power went.
 TEST(Operation, MendedSeed108797437DroppedItsRegistrationItself) {
