@@ -47,6 +47,7 @@ constexpr double kAtBoard = 0.3;  // of operations with pictures: the scope is c
 constexpr double kFaultsFrom_s = 20, kQuietAtEnd_s = 10;
 constexpr Duration kScreen = Duration::from_ms(20);  // from one picture on the screen to the next
 constexpr double kActs_s = 0.1;                      // from one look of the surgeon to the next
+constexpr double kMemory_s = 1;                      // to ask takes as long as a few poses
 
 /// A log with the operation's time before each line, and a hash of more than it tells.
 class Journal {
@@ -315,7 +316,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
   Announcer announcer(out.faults);
   std::string said, step, screen;
   bool had_power = true;
-  double acts_at_s = 0;
+  double acts_at_s = 0, memory_at_s = 0;
   const HostTime end = host_now() + Duration::from_seconds(operation.minutes * 60);
   while (host_now() < end) {
     befalling.advance(device_now().ns);
@@ -366,7 +367,10 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     if (journal.at_s(now) < acts_at_s) continue;
     acts_at_s = journal.at_s(now) + kActs_s;
     surgeon.act(journal.at_s(now), now, shown);
-    laws.take_memory(heap_bytes_in_use(), now);
+    if (journal.at_s(now) >= memory_at_s) {
+      memory_at_s = journal.at_s(now) + kMemory_s;
+      laws.take_memory(heap_bytes_in_use(), now);
+    }
     const host::OperationView view = workflow.view();
     laws.take(view, surgeon.checks(), now);
     const host::StepNote& note = view.note(view.step);

@@ -141,14 +141,15 @@ void OperationLaws::judge_turn(const wire::Bird& bird, double true_s, double now
   const std::size_t number = bird_of(bird.name);
   const auto truth = [&](double at_s) { return truth_.tracker_from_sensor(number, at_s).rotation(); };
   const double off_deg = degrees_between(truth(true_s), bird.tracker_from_sensor.rotation());
+  const double noise_deg = kSigmas * std::sqrt(3.0) * OperationTruth::kNoise.angle_deg + kQuantum_deg;
+  if (off_deg < noise_deg) return;  // good, however slowly it turns
   // As speed_mm_s has it.
   constexpr double kStep_s = 0.01;
   double most_deg_s = 0;
   for (int step = -2; step < 2; ++step)
     most_deg_s = std::max(
         most_deg_s, degrees_between(truth(true_s + step * kStep_s), truth(true_s + (step + 1) * kStep_s)) / kStep_s);
-  const double may_deg =
-      kSigmas * std::sqrt(3.0) * OperationTruth::kNoise.angle_deg + kQuantum_deg + most_deg_s * time_s;
+  const double may_deg = noise_deg + most_deg_s * time_s;
   if (off_deg > may_deg)
     break_law(now_s, "pose",
               fmt::format("{} is turned by {:.2f} degrees where it may be by {:.2f}", bird.name, off_deg, may_deg));

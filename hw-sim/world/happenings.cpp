@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
@@ -22,10 +23,18 @@ Transform<Frame, Frame> about(const Vector3d& pivot_mm, const Vector3d& turn, co
 
 }  // namespace
 
+Happenings::Happenings(std::vector<Fault> faults) {
+  for (Fault& fault : faults) {
+    const double over_s = fault.values.contains("over_s") ? fault.value("over_s") : 0;
+    faults_.push_back({std::move(fault), over_s});
+  }
+}
+
 /// 0 before it, 1 while it holds, between them while it comes and goes.
-double Happenings::share(const Fault& fault, double world_s) const {
-  const double over_s = fault.values.contains("over_s") ? fault.value("over_s") : 0;
-  const auto come = [&](double at_s) {
+double Happenings::share(const Timed& timed, double world_s) {
+  const auto& [fault, over_s] = timed;
+  if (world_s < fault.at_s) return 0;
+  const auto come = [world_s, over_s = over_s](double at_s) {
     if (over_s > 0) return ease((world_s - at_s) / over_s);
     return world_s >= at_s ? 1.0 : 0.0;
   };
@@ -34,9 +43,9 @@ double Happenings::share(const Fault& fault, double world_s) const {
 
 template <typename Visit>
 void Happenings::each(FaultKind kind, double world_s, const Visit& visit) const {
-  for (const Fault& fault : faults_) {
-    if (fault.kind != kind) continue;
-    if (const double now = share(fault, world_s); now > 0) visit(fault, now);
+  for (const Timed& timed : faults_) {
+    if (timed.fault.kind != kind) continue;
+    if (const double now = share(timed, world_s); now > 0) visit(timed.fault, now);
   }
 }
 

@@ -17,7 +17,7 @@ class Happenings {
  public:
   Happenings() = default;
   /// faults: those of a script that are the world's.
-  explicit Happenings(std::vector<Fault> faults) : faults_(std::move(faults)) {}
+  explicit Happenings(std::vector<Fault> faults);
 
   /// What every pose of the tracker is multiplied with from the left: the transmitter was bumped.
   [[nodiscard]] Transform<Tracker, Tracker> transmitter(double world_s) const;
@@ -38,11 +38,16 @@ class Happenings {
   [[nodiscard]] Transform<Camera, Camera> scope(double world_s) const;
 
  private:
-  [[nodiscard]] double share(const Fault& fault, double world_s) const;
+  /// An hour has hundreds, and each place of each bird asks all of them.
+  struct Timed {
+    Fault fault;
+    double over_s = 0;
+  };
+  [[nodiscard]] static double share(const Timed& timed, double world_s);
   template <typename Visit>
   void each(FaultKind kind, double world_s, const Visit& visit) const;
 
-  std::vector<Fault> faults_;
+  std::vector<Timed> faults_;
 };
 
 }  // namespace birdseye::hw_sim
