@@ -24,7 +24,6 @@ CheckReading check_by_landmarks(const Eigen::Vector3d& tip_in_tracker_mm, const 
     if (!reading.nearest.empty() && distance_mm >= reading.distance_mm) return;
     reading.nearest = name;
     reading.nearest_mm = place_mm;
-    reading.nearest_mm = place_mm;
     reading.distance_mm = distance_mm;
     reading.fitted = std::ranges::any_of(registered.fiducials_in_patient_mm, [&](const Eigen::Vector3d& fitted_mm) {
       return (fitted_mm - place_mm).norm() < kSamePlace_mm;

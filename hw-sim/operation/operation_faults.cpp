@@ -188,6 +188,14 @@ void draw(std::span<const DrawnFault> kinds, std::uint64_t seed, double between_
   }
 }
 
+std::vector<Fault> all_drawn(std::span<const DrawnFault> kinds, std::uint64_t seed, double between_s, double from_s,
+                             double until_s) {
+  std::vector<Fault> faults;
+  draw(kinds, seed, between_s, from_s, until_s,
+       [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
+  return faults;
+}
+
 }  // namespace
 
 FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool reference) {
@@ -215,42 +223,28 @@ void draw_bumps_in_view(std::uint64_t seed, double from_s, double until_s, Fault
 }
 
 std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double until_s) {
-  std::vector<Fault> faults;
-  draw(kDrawnOfPrograms, hashed_word(seed, 6), 90, from_s, until_s,
-       [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
-  return faults;
+  return all_drawn(kDrawnOfPrograms, hashed_word(seed, 6), 90, from_s, until_s);
 }
 
 std::vector<Fault> draw_scope_exchanges(std::uint64_t seed, double from_s, double until_s) {
-  std::vector<Fault> faults;
-  draw(kDrawnOfScopes, hashed_word(seed, 12), 300, from_s, until_s,
-       [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
-  return faults;
+  return all_drawn(kDrawnOfScopes, hashed_word(seed, 12), 300, from_s, until_s);
 }
 
 std::vector<Fault> draw_delays(std::uint64_t seed, double from_s, double until_s) {
-  std::vector<Fault> faults;
-  draw(kDrawnDelays, hashed_word(seed, 14), 100, from_s, until_s,
-       [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
-  return faults;
+  return all_drawn(kDrawnDelays, hashed_word(seed, 14), 100, from_s, until_s);
 }
 
 std::vector<Fault> draw_tilts(std::uint64_t seed, double from_s, double until_s) {
-  std::vector<Fault> faults;
-  draw(kDrawnTilts, hashed_word(seed, 15), 200, from_s, until_s,
-       [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
-  return faults;
+  return all_drawn(kDrawnTilts, hashed_word(seed, 15), 200, from_s, until_s);
 }
 
 std::vector<Fault> draw_disk_faults(std::uint64_t seed, double from_s, double until_s) {
-  std::vector<Fault> faults;
-  draw(kDrawnOfDisk, hashed_word(seed, 9), 120, from_s, until_s, [&](const DrawnFault& drawn, Fault fault) {
-    if (drawn.kind == FaultKind::power_cut) {
-      double& after_syncs = fault.values.find("after_syncs")->second;
-      after_syncs = std::floor(after_syncs);
-    }
-    faults.push_back(std::move(fault));
-  });
+  std::vector<Fault> faults = all_drawn(kDrawnOfDisk, hashed_word(seed, 9), 120, from_s, until_s);
+  for (Fault& fault : faults) {
+    if (fault.kind != FaultKind::power_cut) continue;
+    double& after_syncs = fault.values.find("after_syncs")->second;
+    after_syncs = std::floor(after_syncs);
+  }
   return faults;
 }
 
