@@ -1,10 +1,9 @@
-// Whole operations in virtual time, and whether what judges them can tell.
+// Whole operations in virtual time.
 #include "hw-sim/operation/operation.hpp"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <functional>
 #include <map>
@@ -13,7 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "calibration/base/units.hpp"
 #include "hw-sim/faults/fault_table.hpp"
 #include "hw-sim/operation/operation_faults.hpp"
 #include "hw-sim/operation/shortest_script.hpp"
@@ -447,122 +445,6 @@ TEST(ShortestScript, HasWhatBreaksAndNothingElse) {
   EXPECT_EQ(few.camera.size(), 1U);
   EXPECT_TRUE(few.world.empty());
   EXPECT_LT(tried, 300);
-}
-
-/// What laws say of a patient without a fault, by hand.
-class Laws : public ::testing::Test {
- protected:
-  Laws()
-      : laws_(
-            truth_, faults_, [](std::uint64_t) { return 1'000'000'000; }, 0) {}
-
-  wire::Birds scope(double at_s, const Eigen::Vector3d& off_mm) {
-    const auto pose = truth_.tracker_from_sensor(0, at_s);
-    wire::Birds birds;
-    birds.acquired = DeviceTime{static_cast<std::int64_t>(at_s * 1e9)};
-    birds.birds.push_back({"scope", {pose.rotation(), Eigen::Vector3d(pose.translation() + off_mm)}});
-    return birds;
-  }
-
-  FaultScript faults_;
-  OperationTruth truth_{1, 96, 72, Happenings(), false};
-  OperationLaws laws_;
-};
-
-TEST_F(Laws, APoseThatIsOffByMoreThanItMayBeIsFound) {
-  laws_.take(scope(1, {1, 0, 0}), HostTime{1'020'000'000});
-  EXPECT_TRUE(laws_.broken().empty());
-  laws_.take(scope(2, {20, 0, 0}), HostTime{2'020'000'000});
-  ASSERT_EQ(laws_.broken().size(), 1U);
-  EXPECT_EQ(laws_.broken().front().law, "pose");
-}
-
-TEST_F(Laws, APoseThatIsTurnedByMoreThanItMayBeIsFound) {
-  wire::Birds birds = scope(1, {0, 0, 0});
-  const Transform<Tracker, Sensor> pose = birds.birds.front().tracker_from_sensor;
-  const auto turned = [&](double by_deg) {
-    const Eigen::Matrix3d by = Eigen::AngleAxisd(by_deg * kRadPerDeg, Eigen::Vector3d::UnitX()).toRotationMatrix();
-    birds.birds.front().tracker_from_sensor = {Eigen::Matrix3d(pose.rotation() * by), pose.translation()};
-    return birds;
-  };
-  laws_.take(turned(0.5), HostTime{1'020'000'000});
-  EXPECT_TRUE(laws_.broken().empty());
-  laws_.take(turned(3), HostTime{1'020'000'000});
-  ASSERT_EQ(laws_.broken().size(), 1U);
-  EXPECT_EQ(laws_.broken().front().law, "pose");
-}
-
-TEST_F(Laws, MemoryThatGrowsOnIsFound) {
-  constexpr std::size_t kMb = std::size_t{1} << 20;
-  laws_.take_memory(100 * kMb, HostTime{60'000'000'000});
-  laws_.take_memory(110 * kMb, HostTime{130'000'000'000});
-  EXPECT_TRUE(laws_.broken().empty());
-  laws_.take_memory(117 * kMb, HostTime{140'000'000'000});
-  ASSERT_EQ(laws_.broken().size(), 1U);
-  EXPECT_EQ(laws_.broken().front().law, "memory");
-}
-
-TEST(OperationLaws, AFaultThatNobodyNamesAndThatDoesNotEndIsFound) {
-  FaultScript faults;
-  Fault frozen;
-  frozen.kind = FaultKind::frozen_pose;
-  frozen.at_s = 10;
-  frozen.for_s = 2;
-  faults.tracker.push_back(frozen);
-  const OperationTruth truth(1, 96, 72, Happenings(), false);
-  OperationLaws laws(
-      truth, faults, [](std::uint64_t) { return std::nullopt; }, 0);
-  laws.finish(60);
-  std::vector<std::string> broken;
-  for (const BrokenLaw& law : laws.broken()) broken.push_back(law.law);
-  EXPECT_EQ(broken, (std::vector<std::string>{"named", "over", "over"}));
-}
-
-TEST(OperationLaws, AFaultThatLastsForGoodIsNamedAndNotOver) {
-  FaultScript faults;
-  Fault frozen;
-  frozen.kind = FaultKind::frozen_pose;
-  frozen.at_s = 10;
-  faults.tracker.push_back(frozen);
-  const OperationTruth truth(1, 96, 72, Happenings(), false);
-  OperationLaws laws(
-      truth, faults, [](std::uint64_t) { return std::nullopt; }, 0);
-  laws.finish(60);
-  ASSERT_EQ(laws.broken().size(), 1U);
-  EXPECT_EQ(laws.broken().front().law, "named");
-}
-
-TEST(OperationLaws, AWindowThatForgetsTheRegistrationOrHasAnotherIsFound) {
-  const OperationTruth truth(1, 96, 72, Happenings(), false);
-  host::OperationView view;
-  const auto note = [&view](host::LiveStep step) -> host::StepNote& {
-    return view.notes[static_cast<std::size_t>(step)];
-  };
-  note(host::LiveStep::connect).done = note(host::LiveStep::calibrate).done = true;
-  const auto show = [&](const std::optional<double>& fre_mm, bool writing) {
-    note(host::LiveStep::fiducials).done = fre_mm.has_value();
-    view.fre_mm = fre_mm;
-    view.writing = writing;
-  };
-  const auto broken_after = [&](std::optional<double> takes_up_mm) {
-    OperationLaws laws(
-        truth, {}, [](std::uint64_t) { return std::nullopt; }, 0);
-    for (const auto& [fre_mm, writing] : {std::pair{0.5, true}, {0.5, false}, {0.6, false}, {0.7, true}}) {
-      show(fre_mm, writing);
-      laws.take_kept(view, 0, false, {0});
-    }
-    laws.opened(1);
-    show({}, false);
-    laws.take(view, 1, {0});
-    laws.take_kept(view, 0, false, {0});
-    show(takes_up_mm, false);
-    laws.take(view, 1, {5'000'000'000});
-    return laws.broken().size();
-  };
-  EXPECT_EQ(broken_after({}), 1U);
-  EXPECT_EQ(broken_after(0.5), 1U) << "a later one was kept";
-  EXPECT_EQ(broken_after(0.6), 0U);
-  EXPECT_EQ(broken_after(0.7), 0U) << "it may have been written whole";
 }
 
 TEST(OperationFaults, BumpsInViewAreDrawnWhereNothingElseHidesThem) {
