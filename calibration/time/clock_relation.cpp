@@ -26,8 +26,8 @@ double ClockRelation::sigma_at(std::int64_t device_ns) const {
   return std::max(spread, 0.5 * static_cast<double>(bound_.ns));
 }
 
-/// Of the exchange that leaves least open at that time. The line through all of them leaves its bounds where many
-/// exchanges were slow in the same way, as over a network that is slow in one direction.
+/// The line's offset, within the bounds of the exchange that leaves least open at that time. Where many exchanges were
+/// slow in the same direction the line itself lies outside these bounds.
 ClockRelation::Offset ClockRelation::related_at(std::int64_t device_ns) const {
   double middle_ns = 0, half_ns = std::numeric_limits<double>::infinity();
   for (const Sample& sample : samples_) {

@@ -22,7 +22,7 @@ struct ClockGap {
   [[nodiscard]] HostTime host_from_device(DeviceTime time) const { return host.time + (time - at); }
 };
 
-/// When what a frame or a pose shows was so; empty of other events.
+/// When a frame was exposed, or a pose measured; empty for other events.
 std::optional<DeviceTime> acquired_of(const wire::Event& event);
 
 /// Reads the wire on a thread of its own, so that work on one frame does not make the appliance shed the next. Bounded:

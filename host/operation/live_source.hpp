@@ -43,8 +43,8 @@ class LiveSource {
   void retry();
   /// Connected to what, or why not, in words.
   [[nodiscard]] std::string words() const;
-  /// By the newest frame or pose; empty until that is known. What a recording has is as old as if it had come about as
-  /// it is played.
+  /// By the newest frame or pose; empty until that is known. A recorded frame or pose counts as taken at the
+  /// moment at which it is played.
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;
   /// The simulated cart, once it runs.
   [[nodiscard]] SimulatedCart* cart() const { return cart_.get(); }

@@ -132,7 +132,8 @@ class LiveWorkflow {
   [[nodiscard]] bool asks_for_instruments() const;
   void judge_instruments();
   void follow_held_back();
-  /// A frame or a pose has come; came: when the one before did. counts: what was found by then is in doubt.
+  /// A frame or a pose has come; came: when the one before it did, and then this one. Doubts the registration after a
+  /// long pause, if that counts.
   void note_pause(HostTime now, std::optional<HostTime>& came, bool counts);
   [[nodiscard]] bool asks_for_patient() const;
   [[nodiscard]] bool is_other_patients() const;
@@ -185,11 +186,12 @@ class LiveWorkflow {
   PlacePicks picks_;
   std::string pick_line_;
   PointerTip pointer_;
-  HostTime heard_{};                        ///< now, as it was last told
-  std::optional<HostTime> first_heard_;     ///< of this connection
-  std::optional<HostTime> pointer_was_;     ///< where it was seen last: when, at the earliest
-  std::optional<CheckReading> fits_at_;     ///< in doubt, the first place at which it fits
-  std::map<std::string, double> off_mm_;    ///< by how much it was off where the pointer was held, by the place's name
+  HostTime heard_{};                           ///< now, as it was last told
+  std::optional<HostTime> first_heard_;        ///< of this connection
+  std::optional<HostTime> pointer_was_;        ///< when the newest pose of the pointer was measured, at the earliest
+  std::optional<Eigen::Vector3d> fits_at_mm_;  ///< in doubt, the first place at which it fits; patient frame
+  std::map<std::string, double>
+      off_mm_;  ///< how far each place was off as the pointer was last held there, by the place's name
   std::size_t landmarks_before_doubt_ = 0;  ///< that were known as the registration came into doubt
   FiducialStep fiducials_;
   std::optional<std::size_t> asked_to_take_back_;

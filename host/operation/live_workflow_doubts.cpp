@@ -45,7 +45,7 @@ void LiveWorkflow::doubt_registration(const std::string& why) {
   why_doubted_ = why;
   fiducials_.doubt();
   pointer_ = {};  // where it was before tells nothing of what has moved since
-  fits_at_.reset();
+  fits_at_mm_.reset();
   off_mm_.clear();
   landmarks_before_doubt_ = patient_.landmarks().size();
   if (!fiducials_.registered_or_held_back()) return update_setup();
@@ -83,7 +83,7 @@ void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
   if (news.again && !fiducials_.suspected()) {
     fiducials_.suspect();
     if (fiducials_.suspected()) pointer_ = {};
-    fits_at_.reset();
+    fits_at_mm_.reset();
   }
   if (news.motion && video_.motion() == VideoAgreement::agrees && fiducials_.suspected()) doubt_registration("");
   if (news.motion) update_setup();
@@ -156,9 +156,9 @@ void LiveWorkflow::check_in_doubt(const CheckReading& reading) {
   constexpr double kApart_mm = 30;  // the two places
   if (reading.distance_mm > kMostCheckedOff_mm) return refuse_registration(reading);
   off_mm_[reading.nearest] = reading.distance_mm;
-  if (fits_at_ && (fits_at_->nearest_mm - reading.nearest_mm).norm() >= kApart_mm) return confirm_registration(reading);
+  if (fits_at_mm_ && (*fits_at_mm_ - reading.nearest_mm).norm() >= kApart_mm) return confirm_registration(reading);
   if (!reading.fitted) checked_ = {reading.nearest, reading.distance_mm};
-  if (!fits_at_) fits_at_ = reading;
+  if (!fits_at_mm_) fits_at_mm_ = reading.nearest_mm;
   check_ = {false, words("note_check_second", reading.distance_mm, reading.nearest)};
 }
 
@@ -166,7 +166,7 @@ void LiveWorkflow::refuse_registration(const CheckReading& by) {
   why_doubted_ = words("note_check_off", by.distance_mm, by.nearest);
   check_ = {false, why_doubted_};
   checked_.reset();
-  fits_at_.reset();
+  fits_at_mm_.reset();
   off_mm_.clear();
   fiducials_.doubt();
   update_setup();
@@ -177,7 +177,7 @@ void LiveWorkflow::confirm_registration(const std::optional<CheckReading>& by) {
   if (by && !by->fitted) checked_ = {by->nearest, by->distance_mm};
   check_ = {true, by ? words("note_checked", by->distance_mm, by->nearest) : check_.line};
   fiducials_.confirm();
-  fits_at_.reset();
+  fits_at_mm_.reset();
   why_doubted_.clear();
   if (by) scope_came_.reset();
   update_setup();

@@ -94,7 +94,7 @@ OperationView LiveWorkflow::view() const {
   if (registered) out.fre_mm = registered->fre_mm;
   out.registration_fault = fiducials_.fault();
   out.unconfirmed = !fiducials_.confirmed();
-  out.fits_at_one = fits_at_.has_value();
+  out.fits_at_one = fits_at_mm_.has_value();
   out.registration_held_back = fiducials_.held_back() && fiducials_.registered_or_held_back().has_value();
   out.deforming = deformation_.running();
   if (step_ == LiveStep::deform) out.deform_progress = deformation_.progress();
