@@ -22,7 +22,9 @@ constexpr double kTurned_rad = 15 * M_PI / 180;
 constexpr double kAhead_mm = 100;      // from the camera to what is told of noise
 constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
 constexpr double kPlainly = 3;         // so many times as far off would be plain
-constexpr double kHastePx = 5;         // of the small picture: a key whose poses leave so much open hides what is wrong
+constexpr double kNearlyOff =
+    0.75;                       // of what is allowed: of places that were lost as they came so far nothing is known
+constexpr double kHastePx = 5;  // of the small picture: a key whose poses leave so much open hides what is wrong
 constexpr double kFarthestStepPx = 20;  // of the small picture: what moves farther in one frame is not followed safely
 constexpr double kOfHaste = 0.4;        // of the poses' haste, places move so much at least; where poses leap, less
 constexpr int kOddInRow = 4, kMostWanted = 32;
@@ -66,6 +68,7 @@ struct VideoMotion::Key {
   std::optional<SeenFrom> looked_from;    ///< the last picture that was judged, or the key's
   std::vector<cv::Point2f> looked;        ///< where they were in the last picture that was looked at
   std::size_t kept = 0;                   ///< so many
+  double off = 0;                         ///< in the last picture that was judged, of what is allowed
   std::size_t agreed = 0;                 ///< so many were left when they last agreed, and the scope was calm
   std::size_t left = 0;                   ///< and so many in the first picture after since that did not agree
   PictureToFollow newest;                 ///< the last frame in which most of them were found
@@ -270,6 +273,9 @@ void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
   const bool old = waiting.at - key_->at >= kLongest && from->unsure_px <= kHastePx * small_px;
   const bool renew = judged == Judged::odd ? odd_ >= kOddInRow : judged == Judged::of_what_is_left || calmer || old;
   if (!lost && !renew) return;
+  // The next key begins where these have come to.
+  if (lost && key_->off > kNearlyOff && (state_ == VideoAgreement::agrees || state_ == VideoAgreement::in_doubt))
+    forget_agreement();
   // From the picture that was judged, so that no motion lies between two keys.
   const PictureToFollow newest = key_->newest;
   const DeviceTime newest_at = key_->newest_at;
@@ -345,6 +351,7 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
   const double still_px =
       std::hypot(std::hypot(std::sqrt(13.8) * sigma_px, kFollowedPx * scale), now.unsure_px + key_->from->unsure_px);
   const double allowed_px = std::hypot(still_px, kNotModelled * *std::ranges::max_element(otherwise_px));
+  key_->off = *off_px_ / allowed_px;
   if (*off_px_ > allowed_px) {
     if (odd_ == 0) key_->left = waiting.then.size();
     odd_ += *off_px_ > kPlainly * allowed_px ? kOddInRow : 1;
