@@ -40,6 +40,7 @@ class EmbreeLaparoscope final : public Laparoscope {
         lamp_(settings.lamp_in_camera_mm.cast<float>()),
         exposure_(static_cast<float>(1.55 * std::pow(settings.well_lit_mm / kReferenceMm, 2))),
         noise_level_(static_cast<float>(settings.noise)),
+        field_share_(settings.field),
         blur_px_(settings.blur_px),
         seed_(settings.seed),
         device_(device),
@@ -176,7 +177,7 @@ class EmbreeLaparoscope final : public Laparoscope {
   /// The ray and the light of each pixel.
   void lay_rays() {
     const CameraModel& camera = camera_;
-    const double radius = 0.53 * camera.width_px * camera.fx_px / usual_lens_.fx_px;
+    const double radius = field_share_ * camera.width_px * camera.fx_px / usual_lens_.fx_px;
     for (int y = 0; y < camera.height_px; ++y) {
       for (int x = 0; x < camera.width_px; ++x) {
         const std::size_t at = pixel(x, y);
@@ -344,7 +345,7 @@ class EmbreeLaparoscope final : public Laparoscope {
   CameraModel usual_lens_, camera_;
   Vector3f lamp_;  ///< in the camera frame
   float exposure_, noise_level_;
-  double blur_px_;
+  double field_share_, blur_px_;
   std::uint64_t seed_;
   RTCDevice device_;
   SolidNoise texture_;

@@ -53,6 +53,7 @@ struct LaparoscopeSettings {
   Eigen::Vector3d lamp_in_camera_mm = {0, 0, 0};
   double well_lit_mm = 100;  ///< the distance at which the exposure is right
   double noise = 1;          ///< of the sensor, as a multiple of the usual; 0 is none
+  double field = 0.53;       ///< the radius of the round field, by the picture's width
   double blur_px = 0;        ///< of the lens: a Gaussian's standard deviation
 };
 

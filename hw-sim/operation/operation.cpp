@@ -415,6 +415,8 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
       if (reference) add(out.faults.world, draw_tilts(operation.seed, kFaultsFrom_s, until_s));
     }
     if (operation.pictures && !reference) draw_bumps_in_view(operation.seed, kFaultsFrom_s, until_s, out.faults);
+    if (operation.pictures && operation.more_befalls)
+      draw_scope_faults_in_view(operation.seed, kFaultsFrom_s, until_s, out.faults);
   }
   const VideoSize size = at_board ? kOfBoard : operation.pictures ? kPictures : kGrey;
   OperationTruth truth(operation.seed, size.width_px, size.height_px, Happenings(out.faults.world), reference);
@@ -438,6 +440,8 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
     auto created = OperationScene::create(truth, operation.seed);
     if (!created) return std::move(created).error();
     scene = *std::move(created);
+    for (std::size_t scope = 0; scope < truth.scopes_used(); ++scope)
+      truth.enter_round_field(scope, scene->round_field(scope));
   }
   const auto folder = RendezvousFolder::make();
   if (!folder) return folder.error();

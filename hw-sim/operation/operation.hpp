@@ -20,7 +20,7 @@ struct SimulatedOperation {
   bool programs_end = true;             ///< drawn faults also cut the network, and end programs and start them again
   bool disk_fails = true;               ///< and the disk of the window's machine is late, is full, or loses power
   /// And the network is slow, the window stands still, the table is tilted, and the scope is exchanged for another,
-  /// which has a record of its own.
+  /// which has a record of its own; with pictures, the scope turns in its holder, the lens is zoomed, the organ is cut.
   bool more_befalls = true;
   std::optional<bool> reference{};  ///< a reference bird is fixed on the patient; none: the seed decides
   bool pictures = false;            ///< the video shows what the scope sees; else it is grey all over, and small

@@ -62,6 +62,14 @@ constexpr DrawnFault kDrawn[] = {
 /// The patient that moves along the line of sight, with the scope in his wall, the video does not surely show.
 constexpr DrawnFault kDrawnInView[] = {{FaultKind::transmitter_bumped, kWorld, 20, 90, "mm", 15, 40}};
 
+constexpr DrawnFault kDrawnOfScopeInView[] = {
+    {FaultKind::scope_turned, kWorld, 10, 60, "deg", 15, 60},
+    {FaultKind::scope_turned, kWorld, 10, 60, "deg", -60, -15},
+    {FaultKind::lens_zoomed, kWorld, 10, 60, "factor", 1.2, 1.7},
+    {FaultKind::lens_zoomed, kWorld, 10, 60, "factor", 0.6, 0.85},
+    {FaultKind::resected, kWorld, 0, 0, "aside_mm", -40, 40},
+};
+
 constexpr DrawnFault kDrawnOfPrograms[] = {
     {FaultKind::link_cut, kProgram, 0, 0},
     {FaultKind::appliance_restart, kProgram, 1, 10},
@@ -207,7 +215,10 @@ FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool 
   return script;
 }
 
-void draw_bumps_in_view(std::uint64_t seed, double from_s, double until_s, FaultScript& befalls) {
+namespace {
+
+void draw_in_view(std::span<const DrawnFault> kinds, std::uint64_t seed, double between_s, double from_s,
+                  double until_s, FaultScript& befalls) {
   constexpr double kApart_s = 6;  // the video is back after another fault, and has shown that it goes with the poses
   const auto hides = [](const Fault& other, double at_s) {
     return at_s > other.at_s - kApart_s && at_s < other.at_s + other.for_s.value_or(0) + kApart_s;
@@ -217,9 +228,20 @@ void draw_bumps_in_view(std::uint64_t seed, double from_s, double until_s, Fault
       return std::ranges::any_of(befalls.of(target), [&](const Fault& other) { return hides(other, at_s); });
     });
   };
-  draw(kDrawnInView, hashed_word(seed, 11), 60, from_s, until_s, [&](const DrawnFault& drawn, Fault fault) {
-    if (is_seen(fault.at_s) && is_seen(fault.at_s + *fault.for_s)) befalls.of(drawn.of).push_back(std::move(fault));
+  draw(kinds, seed, between_s, from_s, until_s, [&](const DrawnFault& drawn, Fault fault) {
+    const bool seen = is_seen(fault.at_s) && is_seen(fault.at_s + fault.for_s.value_or(0));
+    if (seen) befalls.of(drawn.of).push_back(std::move(fault));
   });
+}
+
+}  // namespace
+
+void draw_bumps_in_view(std::uint64_t seed, double from_s, double until_s, FaultScript& befalls) {
+  draw_in_view(kDrawnInView, hashed_word(seed, 11), 60, from_s, until_s, befalls);
+}
+
+void draw_scope_faults_in_view(std::uint64_t seed, double from_s, double until_s, FaultScript& befalls) {
+  draw_in_view(kDrawnOfScopeInView, hashed_word(seed, 16), 90, from_s, until_s, befalls);
 }
 
 std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double until_s) {

@@ -39,6 +39,8 @@ FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool 
 /// Without a reference the video alone sees it where the transmitter is bumped: adds bumps, large enough to be seen, to
 /// what befalls from from_s on until until_s, where nothing else hides their begin or their end.
 void draw_bumps_in_view(std::uint64_t seed, double from_s, double until_s, FaultScript& befalls);
+/// The same of the scope: it turns in its holder, or its lens is zoomed; and the organ is cut.
+void draw_scope_faults_in_view(std::uint64_t seed, double from_s, double until_s, FaultScript& befalls);
 /// What befalls the programs: the network is cut, the appliance or the window ends and is started again.
 std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double until_s);
 /// The network is slow from the appliance to the window, or the window stands still.

@@ -20,10 +20,11 @@ namespace birdseye::hw_sim {
 namespace {
 
 constexpr double kSigmas = 6;
-constexpr double kQuantum_mm = 0.06;    // half a count in 914 mm, per axis, and rounding
-constexpr double kQuantum_deg = 0.02;   // of a matrix's words, and rounding
-constexpr double kTrackHolds_s = 0.1;   // a reading after a longer hole is believed once the next agrees
-constexpr double kTimeLimit_s = 0.010;  // of [pose] max_time_sigma_ms: what TDATA promises
+constexpr double kQuantum_mm = 0.06;     // half a count in 914 mm, per axis, and rounding
+constexpr double kQuantum_deg = 0.02;    // of a matrix's words, and rounding
+constexpr double kTrackHolds_s = 0.1;    // a reading after a longer hole is believed once the next agrees
+constexpr double kNoiseIsKnown_s = 2.5;  // after a bird's first record
+constexpr double kTimeLimit_s = 0.010;   // of [pose] max_time_sigma_ms: what TDATA promises
 constexpr double kMostAge_ms = 150;
 constexpr double kMostCircles = 3, kPromisedCircles = 1.5;
 constexpr double kMostBeyond = 0.001;  // of whole overlays, by more than the latter
@@ -33,7 +34,7 @@ constexpr double kTakesUpWithin_s = 2;  // once the instruments are those that i
 constexpr double kCalm_s = 10;          // after a fault's end what it had the window see may still be weighed
 constexpr double kAlone_s = 5;          // from another fault's end to this one's begin, and after it
 constexpr double kLinger_s = 0.5;       // after a fault's end poses may still be made of samples that it touched
-constexpr double kSettles_s = 120;      // until all has been done once, and what may be held is held
+constexpr double kMatches_s = 30;       // after it begins, what the first matching of the CT holds is held
 constexpr std::size_t kMostGrowth = std::size_t{16} << 20;
 constexpr std::size_t kMostBroken = 100;  // that are told
 
@@ -52,9 +53,32 @@ double degrees_between(const Eigen::Matrix3d& one, const Eigen::Matrix3d& other)
   return Eigen::AngleAxisd(Eigen::Matrix3d(one.transpose() * other)).angle() * kDegPerRad;
 }
 
+/// Of what befalls the world: from how it was to how it is.
+double takes_s(const Fault& fault) {
+  return fault.values.contains("over_s") ? fault.value("over_s") : 0;
+}
+
+/// What birds are fixed on, or all of them through the transmitter, against the rest of the world.
+bool moves_birds(const Fault& fault) {
+  switch (fault.kind) {
+    case FaultKind::transmitter_bumped:
+    case FaultKind::bed_tilted:
+    case FaultKind::patient_moved:
+    case FaultKind::reference_moved:
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool starts_appliance(FaultKind kind) {
+  return kind == FaultKind::appliance_restart || kind == FaultKind::scope_exchanged;
+}
+
 /// On the operation's clock. Infinite: it lasts for good.
 double end_of(const Fault& fault) {
   if (fault.for_s) return fault.at_s + *fault.for_s;
+  if (fault.kind == FaultKind::resected) return fault.at_s + takes_s(fault);  // what is cut lies still
   const bool once = fault_spec(fault_name(fault.kind))->without_end == WithoutEnd::once;
   return once ? fault.at_s : std::numeric_limits<double>::infinity();
 }
@@ -81,17 +105,24 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
       if (together && span.signs.shifts_bytes && other.signs.shifts_bytes) span.signs.extra_mm = kUnseenChange_mm;
       // The first record of a frozen bird that gets through is like one of a hand that stopped in the hole before it.
       const bool loses = other.signs.shifts_bytes || other.fault.kind == FaultKind::lost_record;
-      if (together && span.fault.kind == FaultKind::frozen_pose && loses) span.signs.extra_s = kTrackHolds_s;
+      // Until its noise is known, eight records that are the same tell that it is frozen, and then three.
+      const bool is_new = starts_appliance(other.fault.kind) && other.begins_s < span.begins_s &&
+                          span.begins_s < other.ends_s + kNoiseIsKnown_s;
+      if (span.fault.kind == FaultKind::frozen_pose && ((together && loses) || is_new))
+        span.signs.extra_s = kTrackHolds_s;
       if (other.begins_s < span.ends_s + kAlone_s && other.ends_s > span.begins_s - kAlone_s) span.alone = false;
     }
   }
   figures_.faults = spans_.size();
-  constexpr std::size_t kWithReference = 3;
+  const bool referenced = truth.birds() > 2;
   for (const Fault& fault : faults.of(FaultTarget::world)) {
-    if (truth.birds() >= kWithReference) break;
-    const double over_s = fault.values.contains("over_s") ? fault.value("over_s") : 0;
-    moves_.push_back({fault.at_s, fault.at_s + over_s});
-    if (fault.for_s) moves_.push_back({fault.at_s + *fault.for_s, fault.at_s + *fault.for_s + over_s});
+    const bool of_scope = fault.kind == FaultKind::scope_turned || fault.kind == FaultKind::lens_zoomed;
+    const bool of_patient = moves_birds(fault) && !referenced;
+    if (!of_scope && !of_patient) continue;
+    moves_.push_back({fault.at_s, fault.at_s + takes_s(fault), of_patient});
+    if (!fault.for_s) continue;
+    const double back_s = fault.at_s + *fault.for_s;
+    moves_.push_back({back_s, back_s + takes_s(fault), of_patient});
   }
   std::ranges::sort(moves_, {}, &Move::begins_s);
 }
@@ -108,10 +139,9 @@ void OperationLaws::judge_pose(const char* of, std::size_t bird, const Transform
     if (true_s < span.begins_s - kLinger_s || true_s > span.ends_s + kLinger_s) continue;
     if (span.signs.lies) return;
     // A hand does not move like a transmitter that is pushed: what is made of samples about the push is off.
-    if (span.of == FaultTarget::world) {
-      const double over_s = span.fault.value("over_s");
+    if (moves_birds(span.fault)) {
       for (const double change_s : {span.begins_s, span.ends_s})
-        if (true_s > change_s - kLinger_s && true_s < change_s + over_s + kLinger_s) return;
+        if (true_s > change_s - kLinger_s && true_s < change_s + takes_s(span.fault) + kLinger_s) return;
     }
     extra_mm += span.signs.extra_mm;
     extra_s += span.signs.extra_s;
@@ -132,10 +162,9 @@ void OperationLaws::judge_turn(const wire::Bird& bird, double true_s, double now
     // Only a few of its records tell that it is frozen.
     if (span.fault.kind == FaultKind::frozen_pose && true_s > span.begins_s && true_s < span.ends_s + kLinger_s)
       time_s = kTrackHolds_s;
-    const bool world = span.of == FaultTarget::world;
-    if (!world && !span.signs.lies && span.signs.extra_mm == 0 && span.signs.extra_s == 0) continue;
-    if (true_s > span.begins_s - kLinger_s &&
-        true_s < span.ends_s + kLinger_s + (world ? span.fault.value("over_s") : 0))
+    const bool moves = moves_birds(span.fault);
+    if (!moves && !span.signs.lies && span.signs.extra_mm == 0 && span.signs.extra_s == 0) continue;
+    if (true_s > span.begins_s - kLinger_s && true_s < span.ends_s + kLinger_s + (moves ? takes_s(span.fault) : 0))
       return;
   }
   const std::size_t number = bird_of(bird.name);
@@ -245,6 +274,7 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
   if (const host::StepNote& calibrated = view.note(LiveStep::calibrate); calibrated.done)
     judge_accusation(calibrated.doubt == host::words("why_video_differs"), now_s);
   registered_ = view.note(LiveStep::fiducials).done;
+  if (view.deforming && !std::exchange(has_matched_, true)) settles_s_ = std::max(settles_s_, now_s + kMatches_s);
   if (unwatched_to_s_ && now_s > *unwatched_to_s_ && (view.unconfirmed || !registered_)) unwatched_to_s_.reset();
   if (checks_when_opened_ && (checks > *checks_when_opened_ || !view.touches.empty())) checks_when_opened_.reset();
   judge_calibration_kept(view, now_s);
@@ -328,10 +358,10 @@ void OperationLaws::take_kept(const host::OperationView& view, std::uint64_t fai
 
 void OperationLaws::take_memory(std::size_t bytes, HostTime now) {
   const double now_s = at_s(now.ns);
-  if (now_s < kSettles_s) {
+  if (now_s < settles_s_) {
     most_bytes_ = std::max(most_bytes_, bytes);
   } else if (bytes > most_bytes_ + kMostGrowth) {
-    break_law(now_s, "memory", fmt::format("{} bytes are held, {} until {} s", bytes, most_bytes_, kSettles_s));
+    break_law(now_s, "memory", fmt::format("{} bytes are held, {} until {:.0f} s", bytes, most_bytes_, settles_s_));
     most_bytes_ = bytes;
   }
 }
@@ -339,6 +369,7 @@ void OperationLaws::take_memory(std::size_t bytes, HostTime now) {
 void OperationLaws::note_motion(bool whole, double now_s) {
   constexpr double kWatched_s = 0.5;
   for (; next_move_ < moves_.size() && moves_[next_move_].begins_s <= now_s; ++next_move_) {
+    if (!moves_[next_move_].of_patient) continue;
     ++figures_.moved;
     if (!registered_ || (whole_s_ && moves_[next_move_].begins_s - *whole_s_ < kWatched_s)) continue;
     ++figures_.moved_unwatched;
@@ -396,7 +427,8 @@ void OperationLaws::take(const host::ShownPicture& shown, const host::LivePictur
   if (!is_whole(shown) || !drawn_from || !budget) return;
   ++figures_.green;
   if (lies || unwatched_to_s_ || moves_at(exposed_s)) return;
-  const Eigen::Vector3d true_mm = truth_.camera_from_patient(exposed_s) * truth_.target_mm();
+  const Eigen::Vector3d target_mm = truth_.target_mm() + truth_.organ(exposed_s).shift_mm;
+  const Eigen::Vector3d true_mm = truth_.camera_from_patient(exposed_s) * target_mm;
   const auto true_px = project(truth_.lens(exposed_s), true_mm);
   const auto drawn_px = project(picture.setup()->camera(), Eigen::Vector3d(*drawn_from * truth_.target_mm()));
   if (!true_px || !drawn_px) return;

@@ -29,8 +29,8 @@ struct BrokenLaw {
 /// - age: no overlay is on the screen whose frame was exposed more than 150 ms ago.
 /// - setup: no overlay is drawn with the calibration of a scope that is not the one in use.
 /// - circle: no overlay is shown as whole that is off by more than three circles, and of a thousand one at most by more
-///   than one and a half. Without a reference, this is not
-///   asked of frames that are exposed while transmitter or patient move and 0.1 s after; and where they move while no
+///   than one and a half. This is not asked of frames that are exposed while the scope turns in its holder or the lens
+///   is zoomed, and 0.1 s after; nor, without a reference, while transmitter or patient move. Where these move while no
 ///   overlay of a registered patient is whole, nothing is watched that could show it: not before the window asks for a
 ///   landmark, or the patient is registered anew.
 /// - named: a fault that befalls alone is named within 2 s, where anybody can see it.
@@ -40,7 +40,7 @@ struct BrokenLaw {
 ///   something was not kept, or what it had later: the registration with its deformation, and the calibration over the
 ///   board. It draws nothing before a landmark has been checked. A window that cannot keep something says so within 2
 ///   s.
-/// - memory: after two minutes it does not grow.
+/// - memory: after two minutes, and after the CT was first matched with the video, it does not grow.
 class OperationLaws {
  public:
   /// exposed_ns: of a frame by its number, as the camera knows it. zero_ns: when the operation's time begins.
@@ -87,6 +87,7 @@ class OperationLaws {
   };
   struct Move {
     double begins_s = 0, ends_s = 0;
+    bool of_patient = false;  ///< or of the transmitter: against each other
   };
   /// How a patient is registered, and the organ deformed, by what tells one from another.
   struct Found {
@@ -120,11 +121,12 @@ class OperationLaws {
   std::vector<Span> spans_;
   std::optional<wire::Health> before_;
   std::optional<double> ready_since_s_;
-  std::vector<Move> moves_;               ///< of transmitter or patient, without a reference, in their order
+  std::vector<Move> moves_;               ///< that the video alone shows, in their order
   std::size_t next_move_ = 0;             ///< that has not begun yet
   std::optional<double> whole_s_;         ///< when an overlay was last whole
   std::optional<double> unwatched_to_s_;  ///< nothing could show a motion that ended then, and the window has not asked
   std::size_t most_bytes_ = 0;            ///< that were held until it settled
+  double settles_s_ = 120;                ///< until then not all may have been done once
   std::uint64_t failed_syncs_ = 0;
   std::size_t scope_ = 0;                 ///< whose record the window had last
   std::optional<double> unsaid_since_s_;  ///< a sync failed then, and the window has not said so
@@ -137,6 +139,7 @@ class OperationLaws {
   bool begins_at_board_;           ///< the appliance has no record: what calibrates is the board
   bool accused_ = false;           ///< the window says that video and poses do not agree
   bool registered_ = false;        ///< the window says that the patient is
+  bool has_matched_ = false;       ///< the CT with the video
   bool to_take_up_ = false;        ///< the window has still to say what it took up
   bool board_kept_ = false;        ///< a calibration over the board
   bool board_to_take_up_ = false;  ///< the window has still to say that it took that up

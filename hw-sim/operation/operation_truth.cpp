@@ -53,6 +53,7 @@ OperationTruth::OperationTruth(std::uint64_t seed, int width_px, int height_px, 
   fiducials_mm_ = {{0, 0, 0}, {60, 5, -5}, {65, 75, 0}, {-5, 70, 20}, {30, 20, 55}, {35, 70, 50}};
   for (Vector3d& place : fiducials_mm_) place += drawn.within(4);
   target_mm_ = organ_middle_mm() + drawn.within(8);
+  for (face_mm_ = target_mm_; organ_mm(face_mm_) < 0;) face_mm_.z() -= 1;
   hand_.rest_at({0, 0, 200}, 0);
   const CameraModel lens = laparoscope_lens(width_px, height_px);
   CameraModel narrower = lens;
@@ -156,16 +157,55 @@ double OperationTruth::on_its_way_s(double at_s) const {
   return way_s;
 }
 
+/// From rest to rest: to each side, up and down, nearer and farther, turning about each axis.
+OperationTruth::Swing OperationTruth::swing(double at_s) const {
+  constexpr double kTurn_rad = 0.35, kShift_mm = 20;
+  Swing out;
+  for (const double from_s : hurried_s_) {
+    const double u = (at_s - from_s) / kHurry_s;
+    if (u <= 0 || u >= 1) continue;
+    const double share = std::pow(std::sin(M_PI * u), 2), round = 2 * M_PI * u;
+    const Vector3d way(std::sin(round), std::cos(round), std::sin(2 * round));
+    out.turn += share * kTurn_rad * way;
+    out.shift_mm += share * kShift_mm * way;
+  }
+  return out;
+}
+
 /// The scope turns about the target as about a port; it goes with the patient, in whose wall it is.
 Transform<Camera, Patient> OperationTruth::camera_within_patient(double at_s) const {
   const double way_s = on_its_way_s(at_s);
-  const Eigen::Matrix3d turn = rotation_exp(
-      Vector3d(0.25 * std::sin(0.7 * way_s), 0.3 * std::sin(0.5 * way_s + 1), 0.2 * std::sin(0.3 * way_s)));
-  const Vector3d aside(8 * std::sin(0.45 * way_s), 6 * std::cos(0.6 * way_s), kLook_mm + 10 * std::sin(0.35 * way_s));
+  const Swing more = swing(at_s);
+  const Eigen::Matrix3d turn =
+      rotation_exp(Vector3d(more.turn + Vector3d(0.25 * std::sin(0.7 * way_s), 0.3 * std::sin(0.5 * way_s + 1),
+                                                 0.2 * std::sin(0.3 * way_s))));
+  const Vector3d aside(more.shift_mm + Vector3d(8 * std::sin(0.45 * way_s), 6 * std::cos(0.6 * way_s),
+                                                kLook_mm + 10 * std::sin(0.35 * way_s)));
   return {turn, Vector3d(aside - turn * target_mm_)};
 }
 
+CameraModel OperationTruth::lens(double at_s) const {
+  CameraModel zoomed = lens_of(scope_in_use(at_s));
+  zoomed.fx_px *= zoom(at_s);
+  zoomed.fy_px *= zoom(at_s);
+  return zoomed;
+}
+
+void OperationTruth::enter_round_field(std::size_t scope, const std::optional<RoundField>& seen) {
+  scopes_[scope].record.lens->round_field = seen;
+}
+
+OrganChange OperationTruth::organ(double at_s) const {
+  return {.hollow = happenings_.hollow(at_s, face_mm_, -Vector3d::UnitZ(), Vector3d::UnitX()),
+          .shift_mm = happenings_.breath_mm(at_s)};
+}
+
+/// The holder carries the bird, and the scope turns in it.
 Transform<Camera, Patient> OperationTruth::camera_from_patient(double at_s) const {
+  return happenings_.scope(at_s) * unturned_camera_from_patient(at_s);
+}
+
+Transform<Camera, Patient> OperationTruth::unturned_camera_from_patient(double at_s) const {
   if (!bench_ || at_s > left_board_s_ + kCarry_s) return camera_within_patient(at_s);
   const Transform<Tracker, Patient> on = tracker_from_patient(at_s);
   const Transform<Tracker, Camera> over_board =
@@ -175,7 +215,7 @@ Transform<Camera, Patient> OperationTruth::camera_from_patient(double at_s) cons
 }
 
 Transform<Camera, Marker> OperationTruth::camera_from_marker(double at_s) const {
-  return bench_->at(at_s).inverse() * bench_->tracker_from_marker();
+  return happenings_.scope(at_s) * bench_->at(at_s).inverse() * bench_->tracker_from_marker();
 }
 
 /// As far from the transmitter as the patient, so that all sensors are in range above it too.
@@ -190,7 +230,8 @@ Result<void> OperationTruth::begin_at_board(std::uint64_t seed) {
 
 Transform<Tracker, Sensor> OperationTruth::tracker_from_sensor(std::size_t bird, double at_s) const {
   const Transform<Tracker, Patient> on = tracker_from_patient(at_s);
-  if (bird == 0) return on * camera_from_patient(at_s).inverse() * scopes_[scope_in_use(at_s)].camera_from_sensor;
+  if (bird == 0)
+    return on * unturned_camera_from_patient(at_s).inverse() * scopes_[scope_in_use(at_s)].camera_from_sensor;
   if (bird == 2) return on * patient_from_reference_ * happenings_.reference(at_s);
   const HandPath::Place place = hand_.at(at_s);
   const Transform<Patient, Sensor> pointer(place.turn,

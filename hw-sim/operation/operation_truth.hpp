@@ -45,13 +45,15 @@ class OperationTruth {
 
   [[nodiscard]] Transform<Tracker, Patient> tracker_from_patient(double at_s) const;
   [[nodiscard]] Transform<Camera, Patient> camera_from_patient(double at_s) const;
+  /// How far the organ has moved within the patient, and what was cut out of it.
+  [[nodiscard]] OrganChange organ(double at_s) const;
   /// Only at the board.
   [[nodiscard]] Transform<Camera, Marker> camera_from_marker(double at_s) const;
   /// Of the birds scope, pointer and reference, in this order.
   [[nodiscard]] Transform<Tracker, Sensor> tracker_from_sensor(std::size_t bird, double at_s) const;
   [[nodiscard]] std::size_t birds() const { return reference_ ? 3 : 2; }
 
-  /// The scope is moved about quickly from then on, for kHurry_s.
+  /// The scope is moved about quickly and widely from then on, for kHurry_s.
   void hurry(double from_s);
   static constexpr double kHurry_s = 4, kCarry_s = 3;
   /// Where the pointer's tip goes, patient frame.
@@ -63,8 +65,11 @@ class OperationTruth {
   /// The signed distance to the surface of the organ that the target lies in.
   [[nodiscard]] static double organ_mm(const Eigen::Vector3d& point_in_patient_mm);
   [[nodiscard]] static const Eigen::Vector3d& organ_middle_mm();
-  /// Of the scope that is in use. Both scopes' pictures have the same size.
-  [[nodiscard]] const CameraModel& lens(double at_s) const { return lens_of(scope_in_use(at_s)); }
+  /// How often as large as usual the picture is: the lens is zoomed.
+  [[nodiscard]] double zoom(double at_s) const { return happenings_.zoom(at_s); }
+  /// Of the scope that is in use, as it is zoomed. Both scopes' pictures have the same size.
+  [[nodiscard]] CameraModel lens(double at_s) const;
+  /// As it was calibrated.
   [[nodiscard]] const CameraModel& lens_of(std::size_t scope) const { return scopes_[scope].lens; }
   /// 0 or 1.
   [[nodiscard]] std::size_t scope_in_use(double at_s) const;
@@ -75,6 +80,8 @@ class OperationTruth {
   [[nodiscard]] const calibration::CalibrationRecord& record_of(std::size_t scope) const {
     return scopes_[scope].record;
   }
+  /// As the pictures of a scope show it: its record has it from then on.
+  void enter_round_field(std::size_t scope, const std::optional<RoundField>& seen);
 
   /// How the tracker errs, one sigma of each axis.
   static constexpr BirdNoise kNoise{0.3, 0.1};
@@ -87,7 +94,13 @@ class OperationTruth {
   };
   static Scope calibrated(const CameraModel& lens, const Transform<Camera, Sensor>& found, std::uint64_t seed);
   [[nodiscard]] double on_its_way_s(double at_s) const;
+  /// Of a scope in a hurry, beside its way: the camera's turn (rad) and shift (mm).
+  struct Swing {
+    Eigen::Vector3d turn = Eigen::Vector3d::Zero(), shift_mm = Eigen::Vector3d::Zero();
+  };
+  [[nodiscard]] Swing swing(double at_s) const;
   [[nodiscard]] Transform<Camera, Patient> camera_within_patient(double at_s) const;
+  [[nodiscard]] Transform<Camera, Patient> unturned_camera_from_patient(double at_s) const;
 
   Happenings happenings_;
   bool reference_;
@@ -101,6 +114,7 @@ class OperationTruth {
   std::array<Scope, 2> scopes_;
   std::vector<double> exchanged_at_s_;
   Eigen::Vector3d tip_in_pointer_mm_{0, 0, 150}, target_mm_;
+  Eigen::Vector3d face_mm_;  ///< of the organ, where the scope looks at it
   std::vector<Eigen::Vector3d> fiducials_mm_;
 };
 

@@ -67,6 +67,23 @@ TEST_F(Laws, MemoryThatGrowsOnIsFound) {
   EXPECT_EQ(laws_.broken().front().law, "memory");
 }
 
+TEST_F(Laws, WhatTheFirstMatchingHoldsIsNoGrowth) {
+  constexpr std::size_t kMb = std::size_t{1} << 20;
+  host::OperationView view;
+  laws_.take_memory(10 * kMb, HostTime{60'000'000'000});
+  view.deforming = true;
+  laws_.take(view, 0, HostTime{130'000'000'000});
+  laws_.take_memory(30 * kMb, HostTime{159'000'000'000});
+  EXPECT_TRUE(laws_.broken().empty());
+  view.deforming = false;
+  laws_.take(view, 0, HostTime{170'000'000'000});
+  view.deforming = true;
+  laws_.take(view, 0, HostTime{180'000'000'000});
+  laws_.take_memory(47 * kMb, HostTime{190'000'000'000});
+  ASSERT_EQ(laws_.broken().size(), 1U) << "the second";
+  EXPECT_EQ(laws_.broken().front().law, "memory");
+}
+
 TEST(OperationLaws, AFaultThatNobodyNamesAndThatDoesNotEndIsFound) {
   FaultScript faults;
   Fault frozen;
