@@ -61,9 +61,10 @@ void say(std::FILE* where, const std::string& line) {
 
 /// Operations, and their sum.
 Result<void> run_operations(const SeedRun& settings, const StudiedOperations& operations, Ranks* ranks, bool& broken) {
+  const auto study = study_of_operations(operations, beside_us("birdseye-sim"));
+  if (!study) return study.error();
   const auto results = run_seeds(
-      study_of_operations(operations, beside_us("birdseye-sim")), settings,
-      [](const std::string& line) { say(stdout, line); }, ranks);
+      *study, settings, [](const std::string& line) { say(stdout, line); }, ranks);
   if (!results) return results.error();
   if (*results == nullptr) return {};
   const auto sum = sum_of(**results, settings.first_seed, settings.last_seed);

@@ -4,11 +4,36 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <fstream>
 #include <nlohmann/json.hpp>
+
+#include "calibration/record/sha256.hpp"
 
 namespace birdseye::hw_sim {
 
-SeedStudy study_of_operations(const StudiedOperations& operations, const std::string& program) {
+namespace {
+
+/// The first digits of the SHA-256 of its file.
+Result<std::string> build_of(const std::string& program) {
+  constexpr std::size_t kDigits = 12;
+  std::ifstream file(program, std::ios::binary);
+  calibration::Sha256 hash;
+  std::vector<char> bytes(std::size_t{1} << 16);
+  do {
+    file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    const auto count = static_cast<std::size_t>(file.gcount());
+    hash.add({reinterpret_cast<const std::uint8_t*>(bytes.data()), count});
+  } while (file);
+  if (!file.eof()) return Error{Errc::unreadable, program + ": cannot be read; install birdseye-sim again"};
+  return hash.hex().substr(0, kDigits);
+}
+
+}  // namespace
+
+Result<SeedStudy> study_of_operations(const StudiedOperations& operations, const std::string& program) {
+  const auto build = build_of(program);
+  if (!build) return build.error();
   SeedStudy out;
   out.command = {program,     "--end-with-stdin",
                  "operation", "--line",
@@ -16,7 +41,8 @@ SeedStudy study_of_operations(const StudiedOperations& operations, const std::st
                  "--minutes", fmt::format("{}", operations.minutes),
                  "--cores",   "1"};
   if (operations.pictures) out.command.emplace_back("--pictures");
-  out.what = fmt::format("operations of {} minutes{}", operations.minutes, operations.pictures ? " with pictures" : "");
+  out.what = fmt::format("operations of {} minutes{}, build {}", operations.minutes,
+                         operations.pictures ? " with pictures" : "", *build);
   out.file = "operations.sqlite";
   // For the slowest operation: a hundredth of its time is usual, and with pictures a tenth.
   out.patience = Duration::from_seconds(std::max(60.0, 60 * operations.minutes));

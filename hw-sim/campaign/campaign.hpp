@@ -15,8 +15,9 @@ struct StudiedOperations {
 };
 
 /// Simulated operations. One that ends without a result counts as one that broke a law.
-/// program: it knows `operation --line`.
-SeedStudy study_of_operations(const StudiedOperations& operations, const std::string& program);
+/// program: it knows `operation --line`; results of another build of it are another study's. Fails where it cannot be
+/// read.
+Result<SeedStudy> study_of_operations(const StudiedOperations& operations, const std::string& program);
 
 /// Any other study: the command prints one line of JSON for each seed.
 SeedStudy study_of(const std::vector<std::string>& command, Duration patience);

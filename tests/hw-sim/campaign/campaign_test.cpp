@@ -92,7 +92,9 @@ SeedRun up_to(const Scratch& scratch, std::uint64_t last_seed) {
 
 /// What comes of operations of half a minute.
 Result<OperationResult> sum_of_operations(const SeedRun& run, const std::string& program, const Said& said) {
-  const auto results = run_seeds(study_of_operations({.minutes = kMinutes}, program), run, said);
+  const auto study = study_of_operations({.minutes = kMinutes}, program);
+  if (!study) return study.error();
+  const auto results = run_seeds(*study, run, said);
   if (!results) return results.error();
   return sum_of(**results, run.first_seed, run.last_seed);
 }
@@ -104,7 +106,9 @@ TEST(Campaign, RunsTheSeedsThatAreMissingAndNoOthers) {
   const SeedRun run = up_to(scratch, 3);
   {
     std::filesystem::create_directories(run.folder);
-    const auto known = SeedResults::open(run.folder / "operations.sqlite", "operations of 0.5 minutes");
+    const auto study = study_of_operations({.minutes = kMinutes}, beside_us("birdseye-sim"));
+    ASSERT_TRUE(study) << study.error().what;
+    const auto known = SeedResults::open(run.folder / "operations.sqlite", study->what);
     ASSERT_TRUE(known && (*known)->enter({entry_of(result_of_seed(2))}));
   }
   std::string said;
@@ -123,6 +127,15 @@ TEST(Campaign, BeginsNoOperationOnceItsTimeIsOver) {
   const auto sum = sum_of_operations(run, beside_us("birdseye-sim"), hear_nothing);
   ASSERT_TRUE(sum) << sum.error().what;
   EXPECT_EQ(sum->minutes, 0);
+}
+
+TEST(Campaign, ResultsOfAnotherBuildAreRefused) {
+  const Scratch scratch;
+  ASSERT_TRUE(sum_of_operations(up_to(scratch, 1), "/bin/true", hear_nothing));
+  const auto other = sum_of_operations(up_to(scratch, 1), "/bin/false", hear_nothing);
+  ASSERT_FALSE(other);
+  EXPECT_NE(other.error().what.find("give another --out"), std::string::npos) << other.error().what;
+  EXPECT_FALSE(sum_of_operations(up_to(scratch, 1), "/no/such/program", hear_nothing));
 }
 
 TEST(Campaign, AnOperationThatGivesNoResultBreaksALaw) {

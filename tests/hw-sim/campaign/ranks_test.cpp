@@ -14,6 +14,7 @@
 
 #include "drivers/system/child_process.hpp"
 #include "drivers/system/local_programs.hpp"
+#include "hw-sim/campaign/campaign.hpp"
 #include "hw-sim/campaign/ranks.hpp"
 #include "hw-sim/campaign/seed_results.hpp"
 #include "tests/support/scratch.hpp"
@@ -72,7 +73,9 @@ TEST_F(CampaignByRanks, GivesTheSameBySeedWhateverTheirNumber) {
   std::string without;
   for (const int ranks : {0, 1, 3}) {
     ASSERT_EQ(campaign(ranks, {"--seeds", "1:5", "--minutes", "0.5", "--out", folder(ranks)}), 0) << contents_of(log());
-    const std::string lines = lines_in(folder(ranks) + "/operations.sqlite", "operations of 0.5 minutes");
+    const auto study = study_of_operations({.minutes = 0.5}, beside_us("birdseye-sim"));
+    ASSERT_TRUE(study) << study.error().what;
+    const std::string lines = lines_in(folder(ranks) + "/operations.sqlite", study->what);
     EXPECT_EQ(std::ranges::count(lines, '\n'), 5) << lines;
     if (ranks == 0) without = lines;
     EXPECT_EQ(lines, without) << ranks << " ranks";
