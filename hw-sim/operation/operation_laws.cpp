@@ -95,7 +95,7 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
   for (const FaultTarget target : kFaultTargets) {
     for (const Fault& fault : faults.of(target)) {
       const FaultSigns signs = target == FaultTarget::world ? FaultSigns{} : signs_of(fault, target);
-      spans_.push_back({fault, target, signs, fault.at_s, end_of(fault) + signs.own_s, true, {}, {}, {}});
+      spans_.push_back({fault, target, signs, fault.at_s, end_of(fault) + signs.own_s, true, {}, {}, {}, {}});
     }
   }
   for (Span& span : spans_) {
@@ -190,10 +190,12 @@ void OperationLaws::take(const wire::Birds& birds, double now_s) {
     judge_turn(bird, at_s(birds.acquired.ns), now_s);
     judge_pose(bird.name.c_str(), bird_of(bird.name), bird.tracker_from_sensor, at_s(birds.acquired.ns), now_s, 0,
                kTimeLimit_s);
-    if (bird.name != "scope") continue;
     for (Span& span : spans_) {
-      if (now_s > span.ends_s && !span.poses_again_s) span.poses_again_s = now_s;
+      if (now_s > span.ends_s) span.birds_again.set(bird_of(bird.name));
     }
+  }
+  for (Span& span : spans_) {
+    if (!span.poses_again_s && span.birds_again.count() == truth_.birds()) span.poses_again_s = now_s;
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bitset>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -34,7 +35,8 @@ struct BrokenLaw {
 ///   overlay of a registered patient is whole, nothing is watched that could show it: not before the window asks for a
 ///   landmark, or the patient is registered anew.
 /// - named: a fault that befalls alone is named within 2 s, where anybody can see it.
-/// - over: within 2 s of the end of a fault that befalls alone, poses and frames with poses are there again.
+/// - over: within 2 s of the end of a fault that befalls alone, poses of each bird and frames with poses are there
+/// again.
 /// - accused: later than 10 s after the last fault's end the window does not begin to say that video and poses differ.
 /// - kept: a window that is opened again takes up what the one before had as it was last neither writing nor said that
 ///   something was not kept, or what it had later: the registration with its deformation, and the calibration over the
@@ -84,6 +86,7 @@ class OperationLaws {
     double begins_s = 0, ends_s = 0;
     bool alone = true;
     std::optional<double> named_s, poses_again_s, frames_again_s;
+    std::bitset<3> birds_again{};  ///< those that have had a pose since its end
   };
   struct Move {
     double begins_s = 0, ends_s = 0;

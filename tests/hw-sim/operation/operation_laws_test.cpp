@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
@@ -98,6 +99,30 @@ TEST(OperationLaws, AFaultThatNobodyNamesAndThatDoesNotEndIsFound) {
   std::vector<std::string> broken;
   for (const BrokenLaw& law : laws.broken()) broken.push_back(law.law);
   EXPECT_EQ(broken, (std::vector<std::string>{"named", "over", "over"}));
+}
+
+/// Of two birds one is there again.
+TEST(OperationLaws, ABirdThatDoesNotComeBackIsFound) {
+  FaultScript faults;
+  Fault frozen;
+  frozen.kind = FaultKind::frozen_pose;
+  frozen.at_s = 10;
+  frozen.for_s = 2;
+  faults.tracker.push_back(frozen);
+  const OperationTruth truth(1, 96, 72, Happenings(), false);
+  const auto over = [&](std::size_t birds_again) {
+    OperationLaws laws(
+        truth, faults, [](std::uint64_t) { return std::nullopt; }, 0);
+    wire::Birds birds;
+    birds.acquired = DeviceTime{13'000'000'000};
+    for (std::size_t bird = 0; bird < birds_again; ++bird)
+      birds.birds.push_back({bird == 0 ? "scope" : "pointer", truth.tracker_from_sensor(bird, 13)});
+    laws.take(birds, HostTime{13'000'000'000});
+    laws.finish(60);
+    return std::ranges::count(laws.broken(), "over", &BrokenLaw::law);
+  };
+  EXPECT_EQ(over(1), 2) << "poses, and frames";
+  EXPECT_EQ(over(2), 1) << "frames";
 }
 
 TEST(OperationLaws, AFaultThatLastsForGoodIsNamedAndNotOver) {
