@@ -108,7 +108,7 @@ CalibrationStep::Adopted CalibrationStep::adopt(const calibration::CalibrationRe
   auto scope = ScopeSetup::of_record(record);
   if (!scope) return Adopted::no;
   const std::string& made_utc = record.hand_eye->provenance.made_utc;
-  const auto& before = found_ ? found_ : held_back_ ? held_back_ : former_;
+  const auto& before = rests_on();
   if (before && before->by_board && made_utc <= before->made_utc) return Adopted::no;
   CalibratedScope adopted{*std::move(scope), made_utc, false, {record.tracker, record.camera}, record.scope};
   const bool anew = before && !is_same(*before, adopted);

@@ -41,6 +41,11 @@ class CalibrationStep {
   [[nodiscard]] const std::optional<CalibratedScope>& found() const { return found_; }
   /// What was found with hardware that is not connected now. Nothing is drawn by it.
   [[nodiscard]] const std::optional<CalibratedScope>& held_back() const { return held_back_; }
+  /// What all that was found so far was found by: found(), held_back(), or what an earlier window had by a record that
+  /// has not come yet.
+  [[nodiscard]] const std::optional<CalibratedScope>& rests_on() const {
+    return found_ ? found_ : held_back_ ? held_back_ : former_;
+  }
   /// It is held back because nothing tells what is connected: a person may say that it is the same.
   [[nodiscard]] bool person_may_say() const { return held_back_ && person_may_say_; }
   [[nodiscard]] const StepNote& note() const { return note_; }

@@ -29,7 +29,11 @@ void LiveWorkflow::take(const wire::Calibration& calibration) {
   }
   const auto adopted = calibration_.adopt(*record);
   if (adopted == CalibrationStep::Adopted::no) return;
-  if (adopted == CalibrationStep::Adopted::anew) forget_views(words("note_calibrated_anew"));
+  if (adopted == CalibrationStep::Adopted::anew) {
+    const bool deformed = deformation_.found() != nullptr;
+    forget_views(words("note_calibrated_anew"));
+    if (deformed) keep();
+  }
   follow_held_back();
 }
 
@@ -40,8 +44,7 @@ void LiveWorkflow::keep() {
   operation.ct_stated = patient_.plan()->ct_stated;
   operation.labels_sha256 = patient_.plan()->labels_sha256;
   operation.record_sha256 = record_sha256_;
-  const auto& scope = calibration_.held_back() ? calibration_.held_back() : calibration_.found();
-  operation.calibrated = scope;
+  operation.calibrated = calibration_.rests_on();
   operation.registered = fiducials_.registered_or_held_back();
   operation.deformed = deformation_.found();
   // What the next window finds in it rests on the same.
@@ -63,8 +66,8 @@ void LiveWorkflow::take_up() {
   landmarks_before_doubt_ = patient_.landmarks().size();
   const std::string when = words("note_taken_up", kept->made_utc);
   if (record_sha256_.empty()) record_sha256_ = kept->record_sha256;
-  // The calibration that is in force may be newer: a deformation then means nothing.
-  const bool same_scope = !kept->calibrated || calibration_.take_up(*kept->calibrated, when);
+  // The calibration that is in force may be newer, or nobody knows which one it was: a deformation then means nothing.
+  const bool same_scope = kept->calibrated && calibration_.take_up(*kept->calibrated, when);
   if (fiducials_.take_up(kept->registered, when) && kept->deformed && same_scope) {
     deformation_.take_up(kept->deformed, when);
     show_shape();

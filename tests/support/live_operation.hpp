@@ -103,6 +103,11 @@ inline void give_record(LiveWorkflow& workflow,
   workflow.take(calibration, HostTime{0}, std::nullopt);
 }
 
+/// As a window keeps it that had this record from the appliance.
+inline host::CalibratedScope calibrated_by(const calibration::CalibrationRecord& record) {
+  return {*host::ScopeSetup::of_record(record), record.hand_eye->provenance.made_utc, false};
+}
+
 inline const calibration::Identity kTracker{{"model", "miniBIRD 800"}, {"unit_serial", "4711"}};
 inline const calibration::Identity kCamera{{"card", "Storz"}, {"serial", "A1"}};
 

@@ -12,6 +12,7 @@
 namespace birdseye::host {
 namespace {
 
+using birdseye::testing::calibrated_by;
 using birdseye::testing::connect;
 using birdseye::testing::connect_and_calibrate;
 using birdseye::testing::ct_with_markers;
@@ -121,6 +122,7 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   const Scratch scratch;
   const LiveSettings again = resumed(scratch, scratch.path());
   Operation kept = registered_operation(again);
+  kept.calibrated = calibrated_by(testing::straight_scope_record());
   // All of the small CT has moved by 4 mm towards the left: what is seen at p was at p + u(p).
   DisplacementField field;
   field.size = {2, 2, 2};
@@ -345,7 +347,7 @@ TEST(LiveWorkflow, ADeformationIsTakenUpWithTheCalibrationItWasFoundByAlone) {
   auto other = record;
   other.hand_eye->camera_from_sensor = Transform<Camera, Sensor>(Eigen::Matrix3d::Identity(), {0, 0, 250});
   Operation kept = registered_operation(operation_settings(scratch));
-  kept.calibrated = {*ScopeSetup::of_record(record), record.hand_eye->provenance.made_utc, false};
+  kept.calibrated = calibrated_by(record);
   DisplacementField field;
   field.size = {2, 2, 2};
   field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
@@ -364,6 +366,37 @@ TEST(LiveWorkflow, ADeformationIsTakenUpWithTheCalibrationItWasFoundByAlone) {
       EXPECT_EQ(workflow.view().deformed != nullptr, same) << record_comes_first;
     }
   }
+}
+
+/// A window in between had no record yet when it wrote what it had taken up; or it had another scope's.
+TEST(LiveWorkflow, ADeformationStaysWithItsCalibrationThroughSeveralWindows) {
+  const Scratch scratch;
+  const auto record = birdseye::testing::example_record(768, 576, {}, {});
+  auto other = record;
+  other.hand_eye->camera_from_sensor = Transform<Camera, Sensor>(Eigen::Matrix3d::Identity(), {0, 0, 250});
+  Operation kept = registered_operation(operation_settings(scratch));
+  kept.calibrated = calibrated_by(record);
+  DisplacementField field;
+  field.size = {2, 2, 2};
+  field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
+  field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
+  kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  const auto deformed_with = [&](const calibration::CalibrationRecord* given) {
+    LiveSettings settings = resumed(scratch, scratch.path());
+    settings.out = scratch.path();
+    LiveWorkflow workflow(settings);
+    connect(workflow);
+    load(workflow);
+    EXPECT_EQ(workflow.view().fault, "");
+    if (given != nullptr) give_record(workflow, *given);
+    return workflow.view().deformed != nullptr;
+  };
+  (void)deformed_with(nullptr);
+  EXPECT_TRUE(deformed_with(&record));
+  (void)deformed_with(nullptr);
+  EXPECT_FALSE(deformed_with(&other));
+  EXPECT_FALSE(deformed_with(&record)) << "it was forgotten for good";
 }
 
 TEST(LiveWorkflow, AnOperationOfOtherLabelsIsNotTakenUp) {

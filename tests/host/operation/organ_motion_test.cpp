@@ -106,6 +106,7 @@ class DeformedOperation : public ::testing::Test {
     kept.ct_sha256 = read_patient(settings.patient)->ct_sha256;
     kept.made_utc = "2026-11-22T10:00:00Z";
     kept.registered = {kTrackerFromPatient, 0.3, kFiducials, {birdseye::testing::kTracker, {}, 0}};
+    kept.calibrated = birdseye::testing::calibrated_by(birdseye::testing::straight_scope_record());
     DisplacementField field;
     field.size = {2, 2, 2};
     field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
