@@ -127,6 +127,7 @@ class LiveWorkflow {
   void take_birds(const wire::Birds& birds, HostTime now, const std::optional<ClockGap>& clock);
   void take(const wire::Calibration& calibration);
   void fit();
+  void fit_anew();
   [[nodiscard]] std::string lost_with_registration() const;
   void take(const PlacePicks::Picked& picked);
   [[nodiscard]] bool asks_for_instruments() const;

@@ -71,6 +71,8 @@ void LiveWorkflow::take_up() {
   if (fiducials_.take_up(kept->registered, when) && kept->deformed && same_scope) {
     deformation_.take_up(kept->deformed, when);
     show_shape();
+  } else if (kept->deformed) {
+    views_.forget(words("note_calibrated_anew"));
   }
   judge_instruments();
   update_setup();

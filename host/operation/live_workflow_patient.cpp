@@ -19,9 +19,10 @@ void LiveWorkflow::confirm_patient() {
   if (!patient_.plan() || patient_confirmed_) return;
   if (is_other_patients()) return;  // whom another system names is not to be overruled by a key
   patient_confirmed_ = true;
-  if (!fiducials_.touches().empty() && patient_.markers_in_patient_mm()) {
-    fit();
-    take_up();
+  const bool touched = !fiducials_.touches().empty();
+  if (!touched || patient_.markers_in_patient_mm()) {
+    if (touched) fit();
+    take_up();  // nothing, where that was done before
   }
   update_setup();
 }
@@ -65,13 +66,20 @@ void LiveWorkflow::take(const PlacePicks::Picked& picked) {
   const auto which = patient_.add_marker(centre_mm);
   pick_line_ = words("picked_marker", which.value_or(0) + 1, name_of(marker->kind), centre_mm.x(), centre_mm.y(),
                      centre_mm.z(), (centre_mm - picked.pointed_mm).norm());
-  if (!fiducials_.touches().empty()) fit();
+  fit_anew();
 }
 
 void LiveWorkflow::drop_marker(const Eigen::Vector3d& place_in_patient_mm) {
   const auto which = patient_.drop_marker(place_in_patient_mm);
   pick_line_ = which ? words("dropped_marker", *which + 1) : words("drop_none", PatientStep::kMarkerReach_mm);
-  if (which && !fiducials_.touches().empty()) fit();
+  if (which) fit_anew();
+}
+
+/// The markers are others.
+void LiveWorkflow::fit_anew() {
+  if (fiducials_.touches().empty()) return;
+  fit();
+  keep();
 }
 
 }  // namespace birdseye::host

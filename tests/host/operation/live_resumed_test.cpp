@@ -329,6 +329,27 @@ TEST(LiveWorkflow, ATouchThatWasTakenBackIsNotTakenUp) {
   EXPECT_FALSE(workflow.view().fre_mm.has_value());
 }
 
+/// Touched before the CT had been read, which kept the operation from being taken up with it.
+TEST(LiveWorkflow, AnOperationIsTakenUpOnceAnEarlyTouchIsTakenBack) {
+  const Scratch scratch;
+  register_into(scratch.path(), scratch);
+  LiveWorkflow workflow(resumed(scratch, scratch.path()));
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
+  hand.rest_at(kFiducials[0], 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_EQ(workflow.view().touches.size(), 1U);
+  while (!workflow.view().patient && workflow.view().fault.empty()) {
+    workflow.tick();
+    sleep_for(Duration::from_ms(5));
+  }
+  EXPECT_FALSE(workflow.view().fre_mm.has_value());
+  workflow.undo();
+  workflow.confirm_patient();
+  EXPECT_TRUE(workflow.view().fre_mm.has_value());
+  EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done);
+}
+
 TEST(LiveWorkflow, ADamagedOperationIsNamed) {
   const Scratch scratch;
   register_into(scratch.path(), scratch);
@@ -397,6 +418,10 @@ TEST(LiveWorkflow, ADeformationStaysWithItsCalibrationThroughSeveralWindows) {
   (void)deformed_with(nullptr);
   EXPECT_FALSE(deformed_with(&other));
   EXPECT_FALSE(deformed_with(&record)) << "it was forgotten for good";
+  // Nobody knows of which scope it is.
+  kept.calibrated.reset();
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  EXPECT_FALSE(deformed_with(&record));
 }
 
 TEST(LiveWorkflow, AnOperationOfOtherLabelsIsNotTakenUp) {
