@@ -16,15 +16,15 @@ namespace {
 using Relative = Transform<Camera, Camera>;
 
 constexpr Duration kEvery = Duration::from_ms(100), kLongest = Duration::from_ms(3000);
-constexpr Duration kAverage = Duration::from_ms(40);  // half the width of what a pose is averaged over
+constexpr Duration kUnjudged = Duration::from_ms(250);  // places that are lost after so long tell nothing of it
+constexpr Duration kAverage = Duration::from_ms(40);    // half the width of what a pose is averaged over
 constexpr std::size_t kFewest = 15;
 constexpr double kTurned_rad = 15 * M_PI / 180;
 constexpr double kAhead_mm = 100;      // from the camera to what is told of noise
 constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
 constexpr double kPlainly = 3;         // so many times as far off would be plain
-constexpr double kNearlyOff =
-    0.75;                       // of what is allowed: of places that were lost as they came so far nothing is known
-constexpr double kHastePx = 5;  // of the small picture: a key whose poses leave so much open hides what is wrong
+constexpr double kNearlyOff = 0.75;    // of what is allowed: where places that came so far are lost, nothing is known
+constexpr double kHastePx = 5;         // of the small picture: a key whose poses leave so much open hides what is wrong
 constexpr double kFarthestStepPx = 20;  // of the small picture: what moves farther in one frame is not followed safely
 constexpr double kOfHaste = 0.4;        // of the poses' haste, places move so much at least; where poses leap, less
 constexpr int kOddInRow = 4, kMostWanted = 32;
@@ -68,6 +68,7 @@ struct VideoMotion::Key {
   std::optional<SeenFrom> looked_from;    ///< the last picture that was judged, or the key's
   std::vector<cv::Point2f> looked;        ///< where they were in the last picture that was looked at
   std::size_t kept = 0;                   ///< so many
+  DeviceTime judged_at;                   ///< the last picture that was judged, or the key's
   double off = 0;                         ///< in the last picture that was judged, of what is allowed
   std::size_t agreed = 0;                 ///< so many were left when they last agreed, and the scope was calm
   std::size_t left = 0;                   ///< and so many in the first picture after since that did not agree
@@ -206,7 +207,7 @@ void VideoMotion::wait(const wire::VideoFrame& frame, const PictureToFollow& pic
 void VideoMotion::begin_key(const Waiting& waiting, const PictureToFollow& picture,
                             const std::optional<SeenFrom>& from) {
   auto key = std::make_unique<Key>();
-  key->at = key->newest_at = waiting.at;
+  key->at = key->newest_at = key->judged_at = waiting.at;
   key->farthest_mm = waiting.farthest_mm;
   key->from = key->looked_from = from;
   key->places = key->looked = key->now = distinct_places_to_follow(picture.grey);
@@ -256,7 +257,10 @@ std::optional<VideoMotion::SeenFrom> VideoMotion::seen_from(const Waiting& waiti
 void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
   if (!key_) return;  // lost since
   const auto from = seen_from(waiting, scope);
-  if (!from) return key_.reset();
+  if (!from) {
+    if (!key_->from) key_.reset();
+    return;  // by the next poses: what has moved meanwhile must not lie between two keys
+  }
   if (!key_->from) {
     key_->from = key_->looked_from = from;
     return;
@@ -274,8 +278,11 @@ void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
   const bool renew = judged == Judged::odd ? odd_ >= kOddInRow : judged == Judged::of_what_is_left || calmer || old;
   if (!lost && !renew) return;
   // The next key begins where these have come to.
-  if (lost && key_->off > kNearlyOff && (state_ == VideoAgreement::agrees || state_ == VideoAgreement::in_doubt))
-    forget_agreement();
+  const bool untold_since = waiting.at - key_->judged_at > kUnjudged;
+  if (lost && (untold_since || key_->off > kNearlyOff)) {
+    told_ = {};
+    if (state_ != VideoAgreement::differs) state_ = VideoAgreement::untold;
+  }
   // From the picture that was judged, so that no motion lies between two keys.
   const PictureToFollow newest = key_->newest;
   const DeviceTime newest_at = key_->newest_at;
@@ -352,6 +359,7 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
       std::hypot(std::hypot(std::sqrt(13.8) * sigma_px, kFollowedPx * scale), now.unsure_px + key_->from->unsure_px);
   const double allowed_px = std::hypot(still_px, kNotModelled * *std::ranges::max_element(otherwise_px));
   key_->off = *off_px_ / allowed_px;
+  key_->judged_at = waiting.at;
   if (*off_px_ > allowed_px) {
     if (odd_ == 0) key_->left = waiting.then.size();
     odd_ += *off_px_ > kPlainly * allowed_px ? kOddInRow : 1;

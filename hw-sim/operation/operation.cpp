@@ -45,6 +45,7 @@ struct VideoSize {
 constexpr VideoSize kGrey{96, 72}, kPictures{160, 120}, kOfBoard{192, 144};  // smaller, no board is found
 constexpr double kAtBoard = 0.3;  // of operations with pictures: the scope is calibrated at their beginning
 constexpr double kFaultsFrom_s = 20, kQuietAtEnd_s = 10;
+constexpr double kCalibratedBy_s = 90;  // over the board: with another scope than it was, that would be wrong for good
 constexpr Duration kScreen = Duration::from_ms(20);  // from one picture on the screen to the next
 constexpr double kActs_s = 0.1;                      // from one look of the surgeon to the next
 constexpr double kMemory_s = 1;                      // to ask takes as long as a few poses
@@ -311,6 +312,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
   befalling.begin(zero_ns);
   OperationLaws laws(
       truth, out.faults, [&camera](std::uint64_t sequence) { return camera.exposed_ns(sequence); }, zero_ns);
+  if (operation.pictures) laws.watch_pictures();
   Surgeon surgeon(truth, operation.seed, operation.pictures ? SurgeonDoes::views_too : SurgeonDoes::no_views);
   Journal journal(zero_ns, operation.pictures);
   Announcer announcer(out.faults);
@@ -416,7 +418,7 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
     }
     if (operation.pictures && !reference) draw_bumps_in_view(operation.seed, kFaultsFrom_s, until_s, out.faults);
     if (operation.pictures && operation.more_befalls)
-      draw_scope_faults_in_view(operation.seed, kFaultsFrom_s, until_s, out.faults);
+      draw_scope_faults_in_view(operation.seed, at_board ? kCalibratedBy_s : kFaultsFrom_s, until_s, out.faults);
   }
   const VideoSize size = at_board ? kOfBoard : operation.pictures ? kPictures : kGrey;
   OperationTruth truth(operation.seed, size.width_px, size.height_px, Happenings(out.faults.world), reference);

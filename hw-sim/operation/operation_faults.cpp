@@ -63,8 +63,8 @@ constexpr DrawnFault kDrawn[] = {
 constexpr DrawnFault kDrawnInView[] = {{FaultKind::transmitter_bumped, kWorld, 20, 90, "mm", 15, 40}};
 
 constexpr DrawnFault kDrawnOfScopeInView[] = {
-    {FaultKind::scope_turned, kWorld, 10, 60, "deg", 15, 60},
-    {FaultKind::scope_turned, kWorld, 10, 60, "deg", -60, -15},
+    {FaultKind::scope_turned, kWorld, 10, 60, "deg", 20, 60},
+    {FaultKind::scope_turned, kWorld, 10, 60, "deg", -60, -20},
     {FaultKind::lens_zoomed, kWorld, 10, 60, "factor", 1.2, 1.7},
     {FaultKind::lens_zoomed, kWorld, 10, 60, "factor", 0.6, 0.85},
     {FaultKind::resected, kWorld, 0, 0, "aside_mm", -40, 40},

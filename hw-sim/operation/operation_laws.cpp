@@ -100,7 +100,8 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
   }
   for (Span& span : spans_) {
     for (const Span& other : spans_) {
-      if (&other == &span || other.signs.aside) continue;
+      const bool elsewhere = other.of == FaultTarget::world && !moves_birds(other.fault);
+      if (&other == &span || other.signs.aside || elsewhere) continue;
       const bool together = other.begins_s < span.ends_s && other.ends_s > span.begins_s;
       if (together && span.signs.shifts_bytes && other.signs.shifts_bytes) span.signs.extra_mm = kUnseenChange_mm;
       // The first record of a frozen bird that gets through is like one of a hand that stopped in the hole before it.
@@ -131,6 +132,13 @@ void OperationLaws::break_law(double at_s, const char* law, std::string what) {
   if (broken_.size() < kMostBroken) broken_.push_back({at_s, law, std::move(what)});
 }
 
+bool OperationLaws::changes_about(const Span& span, double at_s) {
+  const auto changes = [&](double change_s) {
+    return at_s > change_s - kLinger_s && at_s < change_s + takes_s(span.fault) + kLinger_s;
+  };
+  return changes(span.begins_s) || changes(span.ends_s);
+}
+
 /// own_mm: 6 sigma of what the pose says of its place; time_s: 6 sigma of its time.
 void OperationLaws::judge_pose(const char* of, std::size_t bird, const Transform<Tracker, Sensor>& told, double true_s,
                                double now_s, double own_mm, double time_s) {
@@ -139,10 +147,7 @@ void OperationLaws::judge_pose(const char* of, std::size_t bird, const Transform
     if (true_s < span.begins_s - kLinger_s || true_s > span.ends_s + kLinger_s) continue;
     if (span.signs.lies) return;
     // A hand does not move like a transmitter that is pushed: what is made of samples about the push is off.
-    if (moves_birds(span.fault)) {
-      for (const double change_s : {span.begins_s, span.ends_s})
-        if (true_s > change_s - kLinger_s && true_s < change_s + takes_s(span.fault) + kLinger_s) return;
-    }
+    if (moves_birds(span.fault) && changes_about(span, true_s)) return;
     extra_mm += span.signs.extra_mm;
     extra_s += span.signs.extra_s;
   }
@@ -162,10 +167,13 @@ void OperationLaws::judge_turn(const wire::Bird& bird, double true_s, double now
     // Only a few of its records tell that it is frozen.
     if (span.fault.kind == FaultKind::frozen_pose && true_s > span.begins_s && true_s < span.ends_s + kLinger_s)
       time_s = kTrackHolds_s;
-    const bool moves = moves_birds(span.fault);
-    if (!moves && !span.signs.lies && span.signs.extra_mm == 0 && span.signs.extra_s == 0) continue;
-    if (true_s > span.begins_s - kLinger_s && true_s < span.ends_s + kLinger_s + (moves ? takes_s(span.fault) : 0))
-      return;
+    if (moves_birds(span.fault)) {
+      if (changes_about(span, true_s)) return;
+      continue;
+    }
+    const bool frozen = span.fault.kind == FaultKind::frozen_pose;
+    if (frozen || (!span.signs.lies && span.signs.extra_mm == 0 && span.signs.extra_s == 0)) continue;
+    if (true_s > span.begins_s - kLinger_s && true_s < span.ends_s + kLinger_s) return;
   }
   const std::size_t number = bird_of(bird.name);
   const auto truth = [&](double at_s) { return truth_.tracker_from_sensor(number, at_s).rotation(); };
@@ -388,6 +396,21 @@ bool OperationLaws::moves_at(double exposed_s) const {
   });
 }
 
+/// Of a whole overlay.
+void OperationLaws::judge_scope(double exposed_s, double now_s) {
+  constexpr double kSeenWithin_s = 3, kTurned_deg = 20, kZoomed = 1.15;
+  for (const Span& span : spans_) {
+    const Fault& fault = span.fault;
+    const bool turned = fault.kind == FaultKind::scope_turned && std::abs(fault.value("deg")) >= kTurned_deg;
+    const bool zoomed =
+        fault.kind == FaultKind::lens_zoomed && std::max(fault.value("factor"), 1 / fault.value("factor")) >= kZoomed;
+    if (!turned && !zoomed) continue;
+    const double since_s = exposed_s - fault.at_s - takes_s(fault);
+    if (since_s > kSeenWithin_s && exposed_s < span.ends_s)
+      break_law(now_s, "turned", fmt::format("an overlay is whole {:.1f} s after {}", since_s, fault_name(fault.kind)));
+  }
+}
+
 /// What the video shows is true: where no fault has touched its times or the poses, nobody may say that they differ.
 void OperationLaws::judge_accusation(bool accused, double now_s) {
   const bool begins = accused && !accused_;
@@ -417,7 +440,7 @@ void OperationLaws::take(const host::ShownPicture& shown, const host::LivePictur
   bool lies = false;
   for (const Span& span : spans_) {
     if (exposed_s < span.begins_s - kLinger_s || exposed_s > span.ends_s + kLinger_s) continue;
-    lies_s += span.signs.extra_s;
+    if (span.of == FaultTarget::camera) lies_s += span.signs.extra_s;
     lies = lies || span.signs.lies || span.signs.extra_mm > 0 || span.signs.extra_s > 0;
   }
   const double age_ms = 1e3 * (now_s - exposed_s - lies_s);
@@ -428,6 +451,7 @@ void OperationLaws::take(const host::ShownPicture& shown, const host::LivePictur
   const auto& budget = picture.decision().expected;
   if (!is_whole(shown) || !drawn_from || !budget) return;
   ++figures_.green;
+  if (pictures_) judge_scope(exposed_s, now_s);
   if (lies || unwatched_to_s_ || moves_at(exposed_s)) return;
   const Eigen::Vector3d target_mm = truth_.target_mm() + truth_.organ(exposed_s).shift_mm;
   const Eigen::Vector3d true_mm = truth_.camera_from_patient(exposed_s) * target_mm;

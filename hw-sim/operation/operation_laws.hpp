@@ -34,6 +34,9 @@ struct BrokenLaw {
 ///   is zoomed, and 0.1 s after; nor, without a reference, while transmitter or patient move. Where these move while no
 ///   overlay of a registered patient is whole, nothing is watched that could show it: not before the window asks for a
 ///   landmark, or the patient is registered anew.
+/// - turned: where the video shows something, no overlay is whole later than 3 s after the scope has turned in its
+///   holder by 20 degrees or the lens was zoomed by 15 %, as long as that lasts. The circle is about the target, which
+///   lies near the axis of both.
 /// - named: a fault that befalls alone is named within 2 s, where anybody can see it.
 /// - over: within 2 s of the end of a fault that befalls alone, poses of each bird and frames with poses are there
 /// again.
@@ -49,6 +52,8 @@ class OperationLaws {
   using ExposedNs = std::function<std::optional<std::int64_t>(std::uint64_t sequence)>;
   OperationLaws(const OperationTruth& truth, const FaultScript& faults, ExposedNs exposed_ns, std::int64_t zero_ns);
 
+  /// The video shows what the scope sees, and the window watches it.
+  void watch_pictures() { pictures_ = true; }
   /// An event as it reached the host.
   void take(const wire::Event& event, HostTime now);
   /// The window was opened.
@@ -103,12 +108,15 @@ class OperationLaws {
   void break_law(double at_s, const char* law, std::string what);
   void judge_pose(const char* of, std::size_t bird, const Transform<Tracker, Sensor>& told, double true_s, double now_s,
                   double own_mm, double time_s);
+  /// What befalls the world comes or goes about then.
+  static bool changes_about(const Span& span, double at_s);
   void judge_turn(const wire::Bird& bird, double true_s, double now_s);
   void take(const wire::Birds& birds, double now_s);
   void take(const wire::VideoFrame& frame, double now_s);
   void take(const wire::Health& health, double now_s);
   void name(double now_s, const std::string& words);
   void judge(const Span& span, double until_s);
+  void judge_scope(double exposed_s, double now_s);
   void judge_accusation(bool accused, double now_s);
   void note_motion(bool whole, double now_s);
   /// Empty: the patient is not registered.
@@ -140,6 +148,7 @@ class OperationLaws {
   Figures figures_;
   std::vector<BrokenLaw> broken_;
   bool begins_at_board_;           ///< the appliance has no record: what calibrates is the board
+  bool pictures_ = false;          ///< the video shows something
   bool accused_ = false;           ///< the window says that video and poses do not agree
   bool registered_ = false;        ///< the window says that the patient is
   bool has_matched_ = false;       ///< the CT with the video

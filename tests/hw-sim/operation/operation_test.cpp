@@ -434,7 +434,20 @@ TEST(OperationWithPictures, AScopeThatTurnsInItsHolderTakesTheOverlayAway) {
       operate({.seed = 3, .minutes = 1.1, .faults = script, .reference = false, .pictures = true});
   EXPECT_TRUE(out.broken.empty()) << told(out);
   EXPECT_LT(says_at_s(out.log, "there is no overlay", 60), 60.7) << out.log;
-  EXPECT_EQ(out.log.find("the overlay is whole", out.log.find("world scope_turned")), std::string::npos) << out.log;
+  const std::size_t turned = out.log.find("world scope_turned");
+  EXPECT_GT(out.log.rfind("the overlay is whole", turned), out.log.rfind("there is no overlay", turned)) << out.log;
+  EXPECT_EQ(out.log.find("the overlay is whole", turned), std::string::npos) << out.log;
+}
+
+/// No pose came for 0.4 s, and the places that could tell were lost.
+TEST(OperationWithPictures, AScopeThatTurnsWhileNoPoseComesIsNotDrawnBy) {
+  FaultScript script;
+  script.world = {usual(FaultKind::scope_turned, 60, 30, {{"deg", 30}, {"over_s", 0.5}})};
+  script.tracker = {usual(FaultKind::lost_record, 60.25, 0.2, {{"chance", 1}})};
+  const OperationOutcome out =
+      operate({.seed = 3, .minutes = 1.1, .faults = script, .reference = false, .pictures = true});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(says_at_s(out.log, "the overlay is whole", 60.7), std::numeric_limits<double>::infinity()) << out.log;
 }
 
 TEST(OperationWithPictures, ALensThatIsZoomedTakesTheOverlayAway) {
