@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "device/birdseyed/byte_codec.hpp"
 #include "device/birdseyed/layout_json.hpp"
@@ -157,6 +159,7 @@ std::optional<RawEvent> event_of(std::uint32_t kind, const Bytes& payload) {
 
 constexpr std::size_t kMostBirds = 14;
 constexpr Duration kLongest = Duration::from_ms(10'000);
+constexpr std::int64_t kFarthest_ns = 1LL << 60;  // 36 years: times can be added and subtracted without overflow
 
 bool is_rate(double hz) {
   return hz >= 1e-3 && hz <= 1e6;  // false of NaN
@@ -245,7 +248,23 @@ std::string fault_of(const drivers::Frame& frame) {
   return fmt::format("a frame of {} x {} pixels in {} bytes", frame.width_px, frame.height_px, frame.rgb->size());
 }
 
+/// All that are in it.
+std::vector<std::int64_t> times_ns_of(const RawEvent& event) {
+  std::vector<std::int64_t> out{time_of(event).ns};
+  if (const auto* came = std::get_if<FrameCame>(&event)) {
+    const drivers::Frame& frame = came->frame;
+    out.insert(out.end(), {frame.acquired.ns, frame.acquired_sigma.ns, frame.arrived.ns, frame.stamp_ahead.ns});
+  }
+  if (const auto* came = std::get_if<EdgesCame>(&event)) {
+    for (const drivers::GpioEdge& edge : came->edges) out.push_back(edge.at.ns);
+  }
+  return out;
+}
+
 std::string fault_of(const RawEvent& event, std::size_t names) {
+  for (const std::int64_t ns : times_ns_of(event)) {
+    if (ns < -kFarthest_ns || ns > kFarthest_ns) return fmt::format("a time of {:g} s", Duration{ns}.seconds());
+  }
   if (const auto* changed = std::get_if<InstrumentChanged>(&event)) return fault_of(*changed, names);
   if (const auto* came = std::get_if<FrameCame>(&event)) return fault_of(came->frame);
   return "";

@@ -429,6 +429,15 @@ TEST(Recording, OfAnEventThatMakesNoSenseIsRefused) {
   camera = camera_runs(0);
   camera.instrument = static_cast<Instrument>(7);
   EXPECT_NE(refusal(camera).find("unknown"), std::string::npos);
+  // Times that cannot be added or subtracted.
+  constexpr DeviceTime kNever{std::numeric_limits<std::int64_t>::min()};
+  EXPECT_NE(refusal(Tick{kNever}).find("a time of -9.22337e+09 s"), std::string::npos);
+  EXPECT_NE(refusal(TrackerBytes{{{1}, kNever}}).find("a time of"), std::string::npos);
+  came = {frame(0, 1, 1)};
+  came.frame.acquired = kNever;
+  EXPECT_NE(refusal(came).find("a time of"), std::string::npos);
+  EXPECT_NE(refusal(EdgesCame{{{drivers::GpioInput::strobe, true, kNever}}, at(0)}).find("a time of"),
+            std::string::npos);
 }
 
 TEST(EventQueue, DropsTheOldestFrameAndNothingElse) {
