@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
+#include <cstdio>
 #include <mutex>
 
 #include "device/birdseyed/appliance.hpp"
@@ -205,7 +206,10 @@ class DoomedFile : public RecordFile {
     if (made) made->file = std::make_unique<DoomedFile>(std::move(made->file), power_fails, counted);
     return made;
   });
-  if (!recorder) ::_exit(1);
+  if (!recorder) {
+    std::fprintf(stderr, "%s\n", recorder.error().what.c_str());
+    ::_exit(1);
+  }
   const DeviceTime deadline = device_now() + Duration::from_ms(10'000);
   for (std::uint8_t i = 0; counted.syncs < 3 || counted.writes < counted.synced_writes + 40; ++i) {
     if (device_now() > deadline) ::_exit(2);
