@@ -248,7 +248,7 @@ std::string fault_of(const drivers::Frame& frame) {
   return fmt::format("a frame of {} x {} pixels in {} bytes", frame.width_px, frame.height_px, frame.rgb->size());
 }
 
-/// All that are in it.
+/// Every time and every span of time that the event holds.
 std::vector<std::int64_t> times_ns_of(const RawEvent& event) {
   std::vector<std::int64_t> out{time_of(event).ns};
   if (const auto* came = std::get_if<FrameCame>(&event)) {

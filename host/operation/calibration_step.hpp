@@ -41,8 +41,8 @@ class CalibrationStep {
   [[nodiscard]] const std::optional<CalibratedScope>& found() const { return found_; }
   /// What was found with hardware that is not connected now. Nothing is drawn by it.
   [[nodiscard]] const std::optional<CalibratedScope>& held_back() const { return held_back_; }
-  /// What all that was found so far was found by: found(), held_back(), or what an earlier window had by a record that
-  /// has not come yet.
+  /// The calibration that registration, views and deformation were found with: found(), held_back(), or that of an
+  /// earlier window whose record has not come yet.
   [[nodiscard]] const std::optional<CalibratedScope>& rests_on() const {
     return found_ ? found_ : held_back_ ? held_back_ : former_;
   }

@@ -75,7 +75,7 @@ void LiveWorkflow::drop_marker(const Eigen::Vector3d& place_in_patient_mm) {
   if (which) fit_anew();
 }
 
-/// The markers are others.
+/// A marker was added or taken away.
 void LiveWorkflow::fit_anew() {
   if (fiducials_.touches().empty()) return;
   fit();

@@ -16,14 +16,14 @@ namespace {
 using Relative = Transform<Camera, Camera>;
 
 constexpr Duration kEvery = Duration::from_ms(100), kLongest = Duration::from_ms(3000);
-constexpr Duration kUnjudged = Duration::from_ms(250);  // places that are lost after so long tell nothing of it
+constexpr Duration kUnjudged = Duration::from_ms(250);  // without a judged picture: what has moved is not known
 constexpr Duration kAverage = Duration::from_ms(40);    // half the width of what a pose is averaged over
 constexpr std::size_t kFewest = 15;
 constexpr double kTurned_rad = 15 * M_PI / 180;
 constexpr double kAhead_mm = 100;      // from the camera to what is told of noise
 constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
 constexpr double kPlainly = 3;         // so many times as far off would be plain
-constexpr double kNearlyOff = 0.75;    // of what is allowed: where places that came so far are lost, nothing is known
+constexpr double kNearlyOff = 0.75;    // of what is allowed: where places so far off are lost, nothing is known
 constexpr double kHastePx = 5;         // of the small picture: a key whose poses leave so much open hides what is wrong
 constexpr double kFarthestStepPx = 20;  // of the small picture: what moves farther in one frame is not followed safely
 constexpr double kOfHaste = 0.4;        // of the poses' haste, places move so much at least; where poses leap, less
@@ -259,7 +259,7 @@ void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
   const auto from = seen_from(waiting, scope);
   if (!from) {
     if (!key_->from) key_.reset();
-    return;  // by the next poses: what has moved meanwhile must not lie between two keys
+    return;  // the key stays: what moves while no pose comes must not lie between two keys
   }
   if (!key_->from) {
     key_->from = key_->looked_from = from;
@@ -277,9 +277,9 @@ void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
   const bool old = waiting.at - key_->at >= kLongest && from->unsure_px <= kHastePx * small_px;
   const bool renew = judged == Judged::odd ? odd_ >= kOddInRow : judged == Judged::of_what_is_left || calmer || old;
   if (!lost && !renew) return;
-  // The next key begins where these have come to.
-  const bool untold_since = waiting.at - key_->judged_at > kUnjudged;
-  if (lost && (untold_since || key_->off > kNearlyOff)) {
+  // The next key begins where these places have come to: what moved them is not seen in any later picture.
+  const bool unjudged = waiting.at - key_->judged_at > kUnjudged;
+  if (lost && (unjudged || key_->off > kNearlyOff)) {
     told_ = {};
     if (state_ != VideoAgreement::differs) state_ = VideoAgreement::untold;
   }

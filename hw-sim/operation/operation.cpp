@@ -45,7 +45,7 @@ struct VideoSize {
 constexpr VideoSize kGrey{96, 72}, kPictures{160, 120}, kOfBoard{192, 144};  // smaller, no board is found
 constexpr double kAtBoard = 0.3;  // of operations with pictures: the scope is calibrated at their beginning
 constexpr double kFaultsFrom_s = 20, kQuietAtEnd_s = 10;
-constexpr double kCalibratedBy_s = 90;  // over the board: with another scope than it was, that would be wrong for good
+constexpr double kCalibratedBy_s = 90;  // a turn or zoom over the board would make the calibration wrong for good
 constexpr Duration kScreen = Duration::from_ms(20);  // from one picture on the screen to the next
 constexpr double kActs_s = 0.1;                      // from one look of the surgeon to the next
 constexpr double kMemory_s = 1;                      // to ask takes as long as a few poses

@@ -30,11 +30,10 @@ constexpr double kMostCircles = 3, kPromisedCircles = 1.5;
 constexpr double kMostBeyond = 0.001;  // of whole overlays, by more than the latter
 constexpr std::uint64_t kFewestGreen = 10'000;
 constexpr double kNamedWithin_s = 2, kOverWithin_s = 2;
-constexpr double kTakesUpWithin_s = 2;  // once the instruments are those that it was registered with
-constexpr double kCalm_s = 10;          // after a fault's end what it had the window see may still be weighed
-constexpr double kAlone_s = 5;          // from another fault's end to this one's begin, and after it
-constexpr double kLinger_s = 0.5;       // after a fault's end poses may still be made of samples that it touched
-constexpr double kMatches_s = 30;       // after it begins, what the first matching of the CT holds is held
+constexpr double kCalm_s = 10;     // after a fault's end what it had the window see may still be weighed
+constexpr double kAlone_s = 5;     // from another fault's end to this one's begin, and after it
+constexpr double kLinger_s = 0.5;  // after a fault's end poses may still be made of samples that it touched
+constexpr double kMatches_s = 30;  // that the first matching of the CT takes until it holds all that it needs
 constexpr std::size_t kMostGrowth = std::size_t{16} << 20;
 constexpr std::size_t kMostBroken = 100;  // that are told
 
@@ -100,8 +99,8 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
   }
   for (Span& span : spans_) {
     for (const Span& other : spans_) {
-      const bool elsewhere = other.of == FaultTarget::world && !moves_birds(other.fault);
-      if (&other == &span || other.signs.aside || elsewhere) continue;
+      const bool moves_no_bird = other.of == FaultTarget::world && !moves_birds(other.fault);
+      if (&other == &span || other.signs.aside || moves_no_bird) continue;
       const bool together = other.begins_s < span.ends_s && other.ends_s > span.begins_s;
       if (together && span.signs.shifts_bytes && other.signs.shifts_bytes) span.signs.extra_mm = kUnseenChange_mm;
       // The first record of a frozen bird that gets through is like one of a hand that stopped in the hole before it.
@@ -262,20 +261,6 @@ void OperationLaws::take(const wire::Event& event, HostTime now) {
   }
 }
 
-void OperationLaws::opened(std::size_t checks) {
-  accused_ = false;
-  to_take_up_ = !kept_.empty();
-  board_to_take_up_ = board_kept_;
-  stood_still();
-  checks_when_opened_ = to_take_up_ ? std::optional(checks) : std::nullopt;
-}
-
-void OperationLaws::stood_still() {
-  may_calibrate_since_s_.reset();
-  ready_since_s_.reset();
-  unsaid_since_s_.reset();
-}
-
 void OperationLaws::take(const host::OperationView& view, std::size_t checks, HostTime now) {
   using host::LiveStep;
   // Or the patient is registered anew: what was touched is never taken up.
@@ -289,81 +274,6 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
   if (checks_when_opened_ && (checks > *checks_when_opened_ || !view.touches.empty())) checks_when_opened_.reset();
   judge_calibration_kept(view, now_s);
   judge_registration_kept(view, now_s);
-}
-
-void OperationLaws::judge_calibration_kept(const host::OperationView& view, double now_s) {
-  using host::LiveStep;
-  if (!board_to_take_up_) return;
-  if (view.note(LiveStep::calibrate).done) {
-    board_to_take_up_ = false;
-    return;
-  }
-  const bool asks = view.asks_for_instruments || view.asks_for_patient;
-  if (asks || !whole_picture_ || !view.note(LiveStep::connect).done) return may_calibrate_since_s_.reset();
-  const double since_s = may_calibrate_since_s_.value_or(now_s);
-  may_calibrate_since_s_ = since_s;
-  if (now_s - since_s < kTakesUpWithin_s) return;
-  board_to_take_up_ = false;
-  break_law(now_s, "kept", "the window was opened again, and the scope is not calibrated any more");
-}
-
-void OperationLaws::judge_registration_kept(const host::OperationView& view, double now_s) {
-  using host::LiveStep;
-  if (!to_take_up_) return;
-  const bool asks = view.asks_for_instruments || view.asks_for_patient;
-  // As long as it is not known whether the instruments are the same it is held back, and not lost.
-  const bool ready =
-      !asks && !view.registration_held_back && view.note(LiveStep::connect).done && view.note(LiveStep::calibrate).done;
-  if (!ready) return ready_since_s_.reset();
-  const double since_s = ready_since_s_.value_or(now_s);
-  ready_since_s_ = since_s;
-  if (view.note(LiveStep::fiducials).done) {
-    to_take_up_ = false;
-    const std::optional<Found> found = found_in(view, now_s);
-    if (!view.touches.empty() || (found && is_kept(*found))) return;
-    return break_law(now_s, "kept",
-                     "the window was opened again, and has another registration or deformation than was kept");
-  }
-  if (now_s - since_s < kTakesUpWithin_s) return;
-  to_take_up_ = false;
-  break_law(now_s, "kept", "the window was opened again, and the patient is not registered any more");
-}
-
-std::optional<OperationLaws::Found> OperationLaws::found_in(const host::OperationView& view, double now_s) {
-  // Before, the window holds what it found with the former scope.
-  if (view.note(host::LiveStep::calibrate).done) scope_ = truth_.scope_in_use(now_s);
-  if (!view.note(host::LiveStep::fiducials).done || !view.fre_mm) return std::nullopt;
-  return Found{*view.fre_mm, view.deformed ? view.deformed->made_utc : std::string(), scope_};
-}
-
-bool OperationLaws::is_kept(const Found& found) const {
-  constexpr double kSame_mm = 1e-6;
-  return std::ranges::any_of(kept_, [&](const Found& one) {
-    // By the views of one scope the organ is not deformed for another.
-    const std::string deformed_utc = one.scope == found.scope ? one.deformed_utc : std::string();
-    return std::abs(one.fre_mm - found.fre_mm) < kSame_mm && found.deformed_utc == deformed_utc;
-  });
-}
-
-void OperationLaws::take_kept(const host::OperationView& view, std::uint64_t failed_syncs, bool powerless,
-                              HostTime now) {
-  const double now_s = at_s(now.ns);
-  const bool all_kept = !view.writing && view.fault.empty() && !powerless;
-  board_kept_ |= all_kept && begins_at_board_ && view.note(host::LiveStep::calibrate).done;
-  // What a window has not taken up yet is there all the same.
-  if (!to_take_up_) {
-    const std::optional<Found> found = found_in(view, now_s);
-    // Nobody has taken back what is held back.
-    if ((all_kept || !found) && !view.registration_held_back) kept_.clear();
-    if (found && std::ranges::count(kept_, *found) == 0 && (all_kept || !kept_.empty())) kept_.push_back(*found);
-  }
-  if (std::exchange(failed_syncs_, failed_syncs) < failed_syncs && !unsaid_since_s_) unsaid_since_s_ = now_s;
-  const bool said = view.fault.starts_with(host::words("note_not_kept", ""));
-  const bool kept_after_all = view.fault.empty() && !view.writing;
-  if (said || kept_after_all) unsaid_since_s_.reset();
-  if (!unsaid_since_s_ || now_s - *unsaid_since_s_ < kNamedWithin_s) return;
-  unsaid_since_s_.reset();
-  break_law(now_s, "kept", "what was found could not be kept, and the window does not say so");
 }
 
 void OperationLaws::take_memory(std::size_t bytes, HostTime now) {
@@ -396,7 +306,7 @@ bool OperationLaws::moves_at(double exposed_s) const {
   });
 }
 
-/// Of a whole overlay.
+/// Of a whole overlay: the turn of the scope, or the zoom of the lens, must have been seen.
 void OperationLaws::judge_scope(double exposed_s, double now_s) {
   constexpr double kSeenWithin_s = 3, kTurned_deg = 20, kZoomed = 1.15;
   for (const Span& span : spans_) {

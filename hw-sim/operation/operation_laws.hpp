@@ -39,13 +39,14 @@ struct BrokenLaw {
 ///   lies near the axis of both.
 /// - named: a fault that befalls alone is named within 2 s, where anybody can see it.
 /// - over: within 2 s of the end of a fault that befalls alone, poses of each bird and frames with poses are there
-/// again.
+///   again.
 /// - accused: later than 10 s after the last fault's end the window does not begin to say that video and poses differ.
 /// - kept: a window that is opened again takes up what the one before had as it was last neither writing nor said that
 ///   something was not kept, or what it had later: the registration with its deformation, and the calibration over the
 ///   board. It draws nothing before a landmark has been checked. A window that cannot keep something says so within 2
 ///   s.
-/// - memory: after two minutes, and after the CT was first matched with the video, it does not grow.
+/// - memory: it does not grow later than two minutes after the beginning, and 30 s after the first matching of the CT
+///   with the video begins.
 class OperationLaws {
  public:
   /// exposed_ns: of a frame by its number, as the camera knows it. zero_ns: when the operation's time begins.
@@ -95,7 +96,7 @@ class OperationLaws {
   };
   struct Move {
     double begins_s = 0, ends_s = 0;
-    bool of_patient = false;  ///< or of the transmitter: against each other
+    bool of_patient = false;  ///< of patient or transmitter against each other; else of scope or lens
   };
   /// How a patient is registered, and the organ deformed, by what tells one from another.
   struct Found {
@@ -108,7 +109,7 @@ class OperationLaws {
   void break_law(double at_s, const char* law, std::string what);
   void judge_pose(const char* of, std::size_t bird, const Transform<Tracker, Sensor>& told, double true_s, double now_s,
                   double own_mm, double time_s);
-  /// What befalls the world comes or goes about then.
+  /// Whether a fault of the world begins or ends about then.
   static bool changes_about(const Span& span, double at_s);
   void judge_turn(const wire::Bird& bird, double true_s, double now_s);
   void take(const wire::Birds& birds, double now_s);
@@ -137,7 +138,7 @@ class OperationLaws {
   std::optional<double> whole_s_;         ///< when an overlay was last whole
   std::optional<double> unwatched_to_s_;  ///< nothing could show a motion that ended then, and the window has not asked
   std::size_t most_bytes_ = 0;            ///< that were held until it settled
-  double settles_s_ = 120;                ///< until then not all may have been done once
+  double settles_s_ = 120;                ///< until then, what is done for the first time may take more memory
   std::uint64_t failed_syncs_ = 0;
   std::size_t scope_ = 0;                 ///< whose record the window had last
   std::optional<double> unsaid_since_s_;  ///< a sync failed then, and the window has not said so

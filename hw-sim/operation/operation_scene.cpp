@@ -14,7 +14,7 @@ namespace birdseye::hw_sim {
 namespace {
 
 constexpr double kSurface_mm = 2;  // between the vertices of the organ's surface
-constexpr double kField = 0.45;    // by which the picture shows more of the field's edge than of the usual scope's
+constexpr double kField = 0.45;    // of the picture's width: more of the field's edge is seen than of the usual scope's
 constexpr double kWall_mm = 130;   // the cavity's, about the target: behind the scope and behind the organ
 const Eigen::Vector3d kReach_mm = Eigen::Vector3d::Constant(70);  // of the organ, about its middle
 
@@ -41,7 +41,7 @@ Result<std::unique_ptr<OperationScene>> OperationScene::create(const OperationTr
   return std::unique_ptr<OperationScene>(new OperationScene(truth, std::move(scopes)));
 }
 
-/// Over the middle of the board.
+/// The scope looks straight at the middle of the board.
 std::optional<RoundField> OperationScene::round_field(std::size_t scope) {
   constexpr std::size_t kPictures = 5;
   constexpr double kAbove_mm = 100;

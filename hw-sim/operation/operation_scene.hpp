@@ -20,7 +20,8 @@ class OperationScene {
   /// truth: outlives it. Errors are Laparoscope::create()'s.
   static Result<std::unique_ptr<OperationScene>> create(const OperationTruth& truth, std::uint64_t seed);
 
-  /// The edge of its round field, as the calibration's pictures of a scope that is in use some time have it.
+  /// The round field of a scope that the operation uses, as calibration finds it in pictures of the board. Empty: not
+  /// found.
   std::optional<RoundField> round_field(std::size_t scope);
   /// RGB, of the size of the truth's lens. The same time gives the same bytes.
   std::vector<std::uint8_t> look(double at_s);

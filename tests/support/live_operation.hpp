@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <memory>
 #include <vector>
 
 #include "drivers/system/wait.hpp"
@@ -106,6 +107,15 @@ inline void give_record(LiveWorkflow& workflow,
 /// As a window keeps it that had this record from the appliance.
 inline host::CalibratedScope calibrated_by(const calibration::CalibrationRecord& record) {
   return {*host::ScopeSetup::of_record(record), record.hand_eye->provenance.made_utc, false};
+}
+
+/// All of the small CT by 4 mm: what is seen at p was at p + u(p).
+inline std::shared_ptr<const host::DeformedOrgan> moved_to_the_left() {
+  host::DisplacementField field;
+  field.size = {2, 2, 2};
+  field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
+  field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
+  return std::make_shared<const host::DeformedOrgan>(host::DeformedOrgan{field, 0.7, host::MotionError{0.7, 1.2}});
 }
 
 inline const calibration::Identity kTracker{{"model", "miniBIRD 800"}, {"unit_serial", "4711"}};

@@ -22,6 +22,7 @@ using birdseye::testing::kFiducials;
 using birdseye::testing::kTrackerFromPatient;
 using birdseye::testing::load;
 using birdseye::testing::looking_at;
+using birdseye::testing::moved_to_the_left;
 using birdseye::testing::operation_settings;
 using birdseye::testing::register_into;
 using birdseye::testing::registered_operation;
@@ -123,12 +124,7 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   const LiveSettings again = resumed(scratch, scratch.path());
   Operation kept = registered_operation(again);
   kept.calibrated = calibrated_by(testing::straight_scope_record());
-  // All of the small CT has moved by 4 mm towards the left: what is seen at p was at p + u(p).
-  DisplacementField field;
-  field.size = {2, 2, 2};
-  field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
-  field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
-  kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
+  kept.deformed = moved_to_the_left();
   ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
   LiveWorkflow workflow(again);
   connect(workflow);
@@ -369,11 +365,7 @@ TEST(LiveWorkflow, ADeformationIsTakenUpWithTheCalibrationItWasFoundByAlone) {
   other.hand_eye->camera_from_sensor = Transform<Camera, Sensor>(Eigen::Matrix3d::Identity(), {0, 0, 250});
   Operation kept = registered_operation(operation_settings(scratch));
   kept.calibrated = calibrated_by(record);
-  DisplacementField field;
-  field.size = {2, 2, 2};
-  field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
-  field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
-  kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
+  kept.deformed = moved_to_the_left();
   for (const bool same : {true, false}) {
     for (const bool record_comes_first : {true, false}) {
       ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
@@ -397,11 +389,7 @@ TEST(LiveWorkflow, ADeformationStaysWithItsCalibrationThroughSeveralWindows) {
   other.hand_eye->camera_from_sensor = Transform<Camera, Sensor>(Eigen::Matrix3d::Identity(), {0, 0, 250});
   Operation kept = registered_operation(operation_settings(scratch));
   kept.calibrated = calibrated_by(record);
-  DisplacementField field;
-  field.size = {2, 2, 2};
-  field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
-  field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
-  kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
+  kept.deformed = moved_to_the_left();
   ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
   const auto deformed_with = [&](const calibration::CalibrationRecord* given) {
     LiveSettings settings = resumed(scratch, scratch.path());

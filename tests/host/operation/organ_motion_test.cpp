@@ -107,11 +107,7 @@ class DeformedOperation : public ::testing::Test {
     kept.made_utc = "2026-11-22T10:00:00Z";
     kept.registered = {kTrackerFromPatient, 0.3, kFiducials, {birdseye::testing::kTracker, {}, 0}};
     kept.calibrated = birdseye::testing::calibrated_by(birdseye::testing::straight_scope_record());
-    DisplacementField field;
-    field.size = {2, 2, 2};
-    field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
-    field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
-    kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
+    kept.deformed = birdseye::testing::moved_to_the_left();
     ASSERT_TRUE(write_operation(scratch_.path(), kept, *testing::authors().machine));
     settings.resume = scratch_.path();
     workflow_.emplace(settings);

@@ -85,13 +85,15 @@ TEST_F(Laws, WhatTheFirstMatchingHoldsIsNoGrowth) {
   EXPECT_EQ(laws_.broken().front().law, "memory");
 }
 
-TEST(OperationLaws, AFaultThatNobodyNamesAndThatDoesNotEndIsFound) {
+/// for_s: empty: for good.
+FaultScript frozen_at_10_s(std::optional<double> for_s) {
   FaultScript faults;
-  Fault frozen;
-  frozen.kind = FaultKind::frozen_pose;
-  frozen.at_s = 10;
-  frozen.for_s = 2;
-  faults.tracker.push_back(frozen);
+  faults.tracker.push_back({FaultKind::frozen_pose, 10, for_s, {}});
+  return faults;
+}
+
+TEST(OperationLaws, AFaultThatNobodyNamesAndThatDoesNotEndIsFound) {
+  const FaultScript faults = frozen_at_10_s(2);
   const OperationTruth truth(1, 96, 72, Happenings(), false);
   OperationLaws laws(
       truth, faults, [](std::uint64_t) { return std::nullopt; }, 0);
@@ -103,12 +105,7 @@ TEST(OperationLaws, AFaultThatNobodyNamesAndThatDoesNotEndIsFound) {
 
 /// Of two birds one is there again.
 TEST(OperationLaws, ABirdThatDoesNotComeBackIsFound) {
-  FaultScript faults;
-  Fault frozen;
-  frozen.kind = FaultKind::frozen_pose;
-  frozen.at_s = 10;
-  frozen.for_s = 2;
-  faults.tracker.push_back(frozen);
+  const FaultScript faults = frozen_at_10_s(2);
   const OperationTruth truth(1, 96, 72, Happenings(), false);
   const auto over = [&](std::size_t birds_again) {
     OperationLaws laws(
@@ -126,11 +123,7 @@ TEST(OperationLaws, ABirdThatDoesNotComeBackIsFound) {
 }
 
 TEST(OperationLaws, AFaultThatLastsForGoodIsNamedAndNotOver) {
-  FaultScript faults;
-  Fault frozen;
-  frozen.kind = FaultKind::frozen_pose;
-  frozen.at_s = 10;
-  faults.tracker.push_back(frozen);
+  const FaultScript faults = frozen_at_10_s({});
   const OperationTruth truth(1, 96, 72, Happenings(), false);
   OperationLaws laws(
       truth, faults, [](std::uint64_t) { return std::nullopt; }, 0);
