@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <string>
 
 namespace birdseye {
 
@@ -9,7 +10,64 @@ namespace {
 
 constexpr int kDeepest = 64;
 
-/// The most brackets, or elements, that are open at once. Those in quotes count too: no text of ours has so many.
+/// A text's place, and what is asked of it.
+struct Reader {
+  std::string_view text;
+  std::size_t at = 0;
+
+  [[nodiscard]] bool ended() const { return at >= text.size(); }
+  [[nodiscard]] bool shows(std::string_view signs) const { return text.substr(at).starts_with(signs); }
+};
+
+/// Goes behind a string of several lines in three quotes. Up to two quotes more belong to its end.
+void pass_over_lines(Reader& reader, std::string_view quotes, bool escapes) {
+  for (reader.at += quotes.size(); !reader.ended(); ++reader.at) {
+    if (reader.shows(quotes)) {
+      reader.at += quotes.size();
+      for (int more = 0; more < 2 && reader.shows(quotes.substr(0, 1)); ++more) ++reader.at;
+      return;
+    }
+    if (escapes && reader.shows("\\")) ++reader.at;
+  }
+}
+
+/// Goes behind a string of one line. A line's end ends it in any case: there the parser gives up.
+void pass_over_string(Reader& reader, char quote, bool escapes) {
+  for (++reader.at; !reader.ended() && reader.text[reader.at] != '\n'; ++reader.at) {
+    if (reader.text[reader.at] == quote) {
+      ++reader.at;
+      return;
+    }
+    if (escapes && reader.text[reader.at] == '\\') ++reader.at;
+  }
+}
+
+/// The text without what opens no level, whatever stands in it: an s for each string, nothing for a comment. As long as
+/// the parser finds no fault it takes the same for strings and comments; it stops at the first.
+std::string without_strings(std::string_view text, Notation notation) {
+  std::string out;
+  out.reserve(text.size());
+  Reader reader{text};
+  while (!reader.ended()) {
+    const char sign = text[reader.at];
+    const bool literal = notation == Notation::toml && sign == '\'';
+    if (notation == Notation::toml && sign == '#') {
+      reader.at = std::min(text.size(), text.find('\n', reader.at));
+    } else if (notation == Notation::toml && (reader.shows(R"(""")") || reader.shows("'''"))) {
+      pass_over_lines(reader, text.substr(reader.at, 3), !literal);
+      out += 's';
+    } else if (sign == '"' || literal) {
+      pass_over_string(reader, sign, !literal);
+      out += 's';
+    } else {
+      out += sign;
+      ++reader.at;
+    }
+  }
+  return out;
+}
+
+/// The most brackets, or elements, that are open at once.
 int open_at_once(std::string_view text, bool elements) {
   int open = 0, most = 0;
   for (std::size_t at = 0; at < text.size(); ++at) {
@@ -51,7 +109,7 @@ int most_in_any_line(std::string_view text, Notation notation) {
   int most = 0;
   while (!text.empty()) {
     const std::string_view line = text.substr(0, text.find('\n'));
-    // Behind a #, rows of dots may be drawn.
+    // Behind a #, rows of dashes may be drawn.
     most = std::max(most, most_in_a_line(line.substr(0, line.find('#')), notation));
     text.remove_prefix(std::min(text.size(), line.size() + 1));
   }
@@ -61,8 +119,11 @@ int most_in_any_line(std::string_view text, Notation notation) {
 }  // namespace
 
 bool nests_too_deeply(std::string_view text, Notation notation) {
-  if (open_at_once(text, notation == Notation::yaml_or_xml) > kDeepest) return true;
-  return notation != Notation::json && most_in_any_line(text, notation) > kDeepest;
+  if (notation == Notation::yaml_or_xml)
+    return open_at_once(text, true) > kDeepest || most_in_any_line(text, notation) > kDeepest;
+  const std::string signs = without_strings(text, notation);
+  return open_at_once(signs, false) > kDeepest ||
+         (notation == Notation::toml && most_in_any_line(signs, notation) > kDeepest);
 }
 
 }  // namespace birdseye

@@ -229,8 +229,8 @@ Json json_of(const CalibrationRecord& record) {
 }
 
 std::string with_checksum(Json json) {
-  json[kChecksumKey] = checksum_of(json.dump());
-  return json.dump(2) + "\n";
+  json[kChecksumKey] = checksum_of(text_of_json(json));
+  return text_of_json(json, 2) + "\n";
 }
 
 }  // namespace
@@ -265,7 +265,7 @@ std::string record_text(const CalibrationRecord& record, const FileSignature& si
 }
 
 std::string signed_sha256(const CalibrationRecord& record) {
-  return sha256_of(json_of(record).dump());
+  return sha256_of(text_of_json(json_of(record)));
 }
 
 Result<CalibrationRecord> parse_record(const std::string& text) {
@@ -281,13 +281,14 @@ Result<SignedRecord> parse_signed_record(const std::string& text) {
   if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kRecordFormat)
     return Error{Errc::bad_format, "is no calibration record, or one that was cut: calibrate again"};
   if (json.value("version", Json()) != CalibrationRecord::kVersion) {
-    return Error{Errc::bad_format, fmt::format("is a calibration record of version {}; this program reads version {}",
-                                               json.value("version", Json()).dump(), CalibrationRecord::kVersion)};
+    return Error{Errc::bad_format,
+                 fmt::format("is a calibration record of version {}; this program reads version {}",
+                             text_of_json(json.value("version", Json())), CalibrationRecord::kVersion)};
   }
   Json told = json;
   told.erase(kChecksumKey);
   const Json checksum = json.value(kChecksumKey, Json());
-  if (!checksum.is_string() || !has_checksum(told.dump(), checksum.get<std::string>())) {
+  if (!checksum.is_string() || !has_checksum(text_of_json(told), checksum.get<std::string>())) {
     return Error{Errc::bad_format,
                  "the calibration record's checksum does not fit: it was damaged or changed by hand; calibrate again"};
   }
@@ -300,7 +301,7 @@ Result<SignedRecord> parse_signed_record(const std::string& text) {
     SignedRecord out{record_of(json), "", std::nullopt, checksum.get<std::string>().starts_with("crc64")};
     if (told.contains(kSignedKey)) out.signature = signature_of_json(told.at(kSignedKey));
     told.erase(kSignedKey);
-    out.sha256 = sha256_of(told.dump());
+    out.sha256 = sha256_of(text_of_json(told));
     return out;
   } catch (const std::exception& problem) {
     return Error{Errc::bad_value, fmt::format("the calibration record makes no sense: {}", problem.what())};

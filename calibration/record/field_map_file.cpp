@@ -70,15 +70,15 @@ std::string field_misfit(const Identity& of_map, const Identity& tracker) {
 }
 
 std::string signed_sha256(const FieldMap& map, const FieldMapNotes& notes) {
-  return sha256_of(json_of(map, notes).dump());
+  return sha256_of(text_of_json(json_of(map, notes)));
 }
 
 std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes,
                            const std::optional<FileSignature>& signature) {
   nlohmann::json json = json_of(map, notes);
   if (signature) json[kSignedKey] = json_of_signature(*signature);
-  json[kChecksumKey] = checksum_of(json.dump());
-  return json.dump(1) + "\n";
+  json[kChecksumKey] = checksum_of(text_of_json(json));
+  return text_of_json(json, 1) + "\n";
 }
 
 Result<FieldMapFile> parse_field_map(const std::string& text) {
@@ -93,7 +93,7 @@ Result<FieldMapFile> parse_field_map(const std::string& text) {
       return no_map(fmt::format("or of a version other than {}", kVersion));
     const auto checksum = json.at(kChecksumKey).get<std::string>();
     json.erase(kChecksumKey);
-    if (!has_checksum(json.dump(), checksum))
+    if (!has_checksum(text_of_json(json), checksum))
       return no_map("or was changed since it was made: its checksum does not fit");
     if (!is_strict)
       return no_map("or was changed since it was made: it says something twice, or goes on behind its end");
@@ -102,7 +102,7 @@ Result<FieldMapFile> parse_field_map(const std::string& text) {
     json.erase(kSignedKey);
     auto out = map_of(json);
     if (!out) return out.error();
-    out->sha256 = sha256_of(json.dump());
+    out->sha256 = sha256_of(text_of_json(json));
     out->signature = std::move(signature);
     out->of_010 = checksum.starts_with("crc64");
     return out;

@@ -2,12 +2,14 @@
 
 #include <nlohmann/json.hpp>
 
+#include "calibration/record/strict_json.hpp"
+
 namespace birdseye::calibration {
 
 std::string signed_words(std::string_view kind, std::string_view sha256, const FileSignature& signature) {
   // As JSON, so that no machine's name can stand for another line.
-  return nlohmann::json{"birdseye signature 1", kind, sha256, signature.machine, signature.key, signature.utc}.dump(
-      -1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return text_of_json(
+      nlohmann::json{"birdseye signature 1", kind, sha256, signature.machine, signature.key, signature.utc});
 }
 
 nlohmann::json json_of_signature(const FileSignature& signature) {

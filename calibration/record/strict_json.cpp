@@ -25,7 +25,14 @@ Json strict_json(const std::string& text) {
   return json;
 }
 
+template <typename Json>
+std::string text_of_json(const Json& json, int indent) {
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
 template nlohmann::json strict_json(const std::string& text);
 template nlohmann::ordered_json strict_json(const std::string& text);
+template std::string text_of_json(const nlohmann::json& json, int indent);
+template std::string text_of_json(const nlohmann::ordered_json& json, int indent);
 
 }  // namespace birdseye::calibration

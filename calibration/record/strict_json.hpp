@@ -11,4 +11,10 @@ namespace birdseye::calibration {
 template <typename Json>
 [[nodiscard]] Json strict_json(const std::string& text);
 
+/// JSON as text, each level indented by so many blanks; in one line without white space where that is negative. Names
+/// of files and what instruments say need not be UTF-8: what is not stands as U+FFFD, for no result may be lost for it.
+/// Of json, and of ordered_json.
+template <typename Json>
+[[nodiscard]] std::string text_of_json(const Json& json, int indent = -1);
+
 }  // namespace birdseye::calibration

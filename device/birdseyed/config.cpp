@@ -320,17 +320,6 @@ constexpr std::pair<const char*, void (*)(ConfigSection&, Config&)> kSections[] 
                                                                                    {"calibration", read_calibration}};
 
 constexpr std::size_t kMostBytes = 256U << 10U;
-constexpr int kMostDepth = 64;
-
-/// The reader of TOML goes into brackets as deep as they are: a file that is none must not end the daemon.
-bool is_too_deep(const std::string& text) {
-  int depth = 0, deepest = 0;
-  for (const char c : text) {
-    if (c == '[' || c == '{') deepest = std::max(deepest, ++depth);
-    if (c == ']' || c == '}') depth = std::max(0, depth - 1);
-  }
-  return deepest > kMostDepth;
-}
 
 Result<std::string> read_text(const std::filesystem::path& path) {
   std::error_code ignored;
@@ -340,8 +329,7 @@ Result<std::string> read_text(const std::filesystem::path& path) {
     return Error{Errc::not_found, fmt::format("{}: no such configuration file", path.string())};
   auto text = read_whole_file(path, kMostBytes);
   if (!text && text.error().code != Errc::unsupported) return text.error();
-  if (!text || is_too_deep(*text))
-    return Error{Errc::bad_format, fmt::format("{}: is no configuration file of birdseyed", path.string())};
+  if (!text) return Error{Errc::bad_format, fmt::format("{}: is no configuration file of birdseyed", path.string())};
   return *std::move(text);
 }
 

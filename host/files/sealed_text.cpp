@@ -20,7 +20,7 @@ constexpr std::string_view kBegin = "{\n", kSums = "sha256", kWhole = "whole", k
 
 std::string line_of(std::string_view name, const nlohmann::json& value) {
   // Names may come from files in other encodings: what is found is not lost for one of them.
-  return fmt::format("\"{}\": {}", name, value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  return fmt::format("\"{}\": {}", name, calibration::text_of_json(value));
 }
 
 /// The line that begins with this name, without the comma at its end.

@@ -31,7 +31,7 @@ constexpr const char* kSums = "sha256";
 /// Of the sheet without its signature.
 std::string sheet_sha256(nlohmann::json sheet) {
   sheet.erase(kSigned);
-  return calibration::sha256_of(sheet.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  return calibration::sha256_of(calibration::text_of_json(sheet));
 }
 
 /// All but the sheet.

@@ -30,6 +30,23 @@ TEST(StrictJson, RefusesWhatStandsBehind) {
 
 TEST(StrictJson, RefusesListsWithoutEnd) {
   EXPECT_TRUE(strict_json<nlohmann::json>(std::string(100'000, '[') + std::string(100'000, ']')).is_discarded());
+  std::string seems_flat = "1";
+  for (int i = 0; i < 20'000; ++i) seems_flat = R"(["]",)" + seems_flat;
+  EXPECT_TRUE(strict_json<nlohmann::json>(seems_flat + std::string(20'000, ']')).is_discarded());
+}
+
+TEST(StrictJson, WhatIsNoUtf8IsWrittenAllTheSame) {
+  EXPECT_EQ(text_of_json(nlohmann::json{{"a", "p\xe9.csv"}}), "{\"a\":\"p\xef\xbf\xbd.csv\"}");
+  EXPECT_EQ(text_of_json(nlohmann::ordered_json{{"b", 1}, {"a", "\xff"}}, 1),
+            "{\n \"b\": 1,\n \"a\": \"\xef\xbf\xbd\"\n}");
+  // Sum and signature are of what is written, so that it is read back.
+  CalibrationRecord record = testing::straight_scope_record();
+  record.scope = "Sc\xffope";
+  record.tip->provenance.made_from = "p\xe9.csv";
+  const auto read = parse_signed_record(record_text(record));
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->record.scope, "Sc\xef\xbf\xbdope");
+  EXPECT_EQ(signed_sha256(read->record), signed_sha256(record));
 }
 
 TEST(StrictJson, ARecordThatOthersReadOtherwiseIsNone) {

@@ -102,6 +102,17 @@ TEST(Config, AFieldMapThatIsNotThereHidesNoMistakeInTheRecord) {
   EXPECT_EQ(what.find("unknown key"), std::string::npos) << what;
 }
 
+/// The parser, and what copies its tables, call themselves for each level: 8 000 of them ended the daemon.
+TEST(Config, OneThatNestsWithoutEndIsRefusedWhateverHidesIt) {
+  for (const std::string level : {"[", "[\"]\",", "[#]\n", "[']',"}) {
+    std::string text = "x = ";
+    for (int i = 0; i < 9'000; ++i) text += level;
+    const auto config = read(text + "1" + std::string(9'000, ']'));
+    ASSERT_FALSE(config) << level;
+    EXPECT_NE(config.error().what.find("nests lists, tables or keys deeper"), std::string::npos) << config.error().what;
+  }
+}
+
 TEST(Config, ADeviceInPlaceOfAFileIsRefusedByItsName) {
   const auto config = read(kSound + std::string("[calibration]\nfield = \"/dev/zero\"\nrecord = \"/dev/zero\"\n"));
   ASSERT_FALSE(config);
