@@ -130,14 +130,14 @@ int pair(const fs::path& path, const PairOptions& options) {
 int replay(const fs::path& path, const fs::path& recording, bool accept_unsigned, const ServiceSignals& signals) {
   const auto config = device::read_config(path);
   if (!config) return refuse(config.error());
-  if (const auto admitted = device::admit_replay(recording, accept_unsigned); !admitted)
-    return refuse(admitted.error());
+  const auto admitted = device::admit_replay(recording, accept_unsigned);
+  if (!admitted) return refuse(admitted.error());
   auto admission = device::admission_of(config->wire);
   if (!admission) return refuse(admission.error());
   const auto server = wire::Server::listen(config->wire.bind, config->wire.port, *std::move(admission));
   if (!server) return refuse(server.error());
   spdlog::info("replaying on {} port {}", config->wire.bind, (*server)->port());
-  const auto done = device::replay(recording, **server, signals.stop());
+  const auto done = device::replay(recording, *admitted, **server, signals.stop());
   return done ? 0 : refuse(done.error());
 }
 

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "calibration/record/strict_json.hpp"
 #include "device/birdseyed/byte_codec.hpp"
 #include "device/birdseyed/layout_json.hpp"
 #include "device/wire/igtl_bytes.hpp"
@@ -287,7 +288,7 @@ Bytes block_of(const RawEvent& event) {
 }
 
 Bytes block_of(const calibration::FileSignature& signature) {
-  const std::string text = json_of_signature(signature).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string text = calibration::text_of_json(json_of_signature(signature));
   return block(kSignature, {text.begin(), text.end()});
 }
 
@@ -300,6 +301,7 @@ Result<RawEventReader> RawEventReader::open(const std::filesystem::path& path) {
   if (magic != recording_magic())
     return Error{Errc::bad_format, fmt::format("{}: is no recording of birdseyed, or one of another version", name)};
   RawEventReader reader(std::move(in), name);
+  reader.sum_.add(magic);
   const auto first = reader.next_block();
   if (!first) return first.error();
   try {
@@ -338,6 +340,7 @@ Result<std::optional<RawEventReader::Block>> RawEventReader::next_block() {
   const std::span all(bytes);
   ByteReader tail(all.last(sizeof(std::uint64_t)));
   if (tail.get<std::uint64_t>() != wire::checksum(all.first(kBlockHead + size))) return damaged();
+  if (block.kind != kSignature) sum_.add(bytes);
   block.payload.assign(bytes.begin() + kBlockHead, bytes.end() - sizeof(std::uint64_t));
   return std::optional<Block>(std::move(block));
 }

@@ -5,9 +5,11 @@
 #include <fstream>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "calibration/record/file_signature.hpp"
+#include "calibration/record/sha256.hpp"
 #include "device/birdseyed/core.hpp"
 
 /// An appliance recording, a file of raw events (docs/manual/appliance-recording.md): eight bytes of magic, then blocks
@@ -36,6 +38,9 @@ class RawEventReader {
   Result<std::optional<RawEvent>> next();
   /// Whether the file ended inside a block.
   [[nodiscard]] bool cut_short() const { return cut_short_; }
+  /// The SHA-256 of all that was read, as ApplianceSeal has it: once next() has given the end. Nothing can be read
+  /// afterwards.
+  [[nodiscard]] std::string sha256() { return sum_.hex(); }
 
  private:
   struct Block {
@@ -48,6 +53,7 @@ class RawEventReader {
   std::ifstream in_;
   std::string name_;
   CoreSettings settings_;
+  calibration::Sha256 sum_;
   bool cut_short_ = false;
 };
 

@@ -13,7 +13,7 @@
 
 namespace birdseye::device {
 
-Result<void> admit_replay(const std::filesystem::path& recording, bool accept_unsigned) {
+Result<std::string> admit_replay(const std::filesystem::path& recording, bool accept_unsigned) {
   const auto seal = read_appliance_seal(recording);
   if (!seal) return seal.error();
   const auto refused = [&recording](const std::string& why) {
@@ -29,10 +29,10 @@ Result<void> admit_replay(const std::filesystem::path& recording, bool accept_un
   std::string doubt = author->standing == Author::Standing::known ? "" : "is " + author->words();
   if (doubt.empty() && !seal->rests_on.empty())
     doubt = fmt::format("rests on what no known machine signed ({})", seal->rests_on);
-  if (doubt.empty()) return {};
+  if (doubt.empty()) return seal->sha256;
   if (!accept_unsigned) return refused(doubt + "; --accept-unsigned plays it all the same");
   spdlog::warn("UNSIGNED: {} {}", recording.string(), doubt);
-  return {};
+  return seal->sha256;
 }
 
 namespace {
@@ -43,7 +43,8 @@ constexpr Duration kLongWait = Duration::from_ms(10'000), kLongestWait = Duratio
 
 }  // namespace
 
-Result<void> replay(const std::filesystem::path& recording, wire::Server& server, const std::stop_token& stop) {
+Result<void> replay(const std::filesystem::path& recording, const std::string& sha256, wire::Server& server,
+                    const std::stop_token& stop) {
   auto reader = RawEventReader::open(recording);
   if (!reader) return reader.error();
   Core core(reader->settings());
@@ -74,8 +75,13 @@ Result<void> replay(const std::filesystem::path& recording, wire::Server& server
     }
     for (const wire::Packet& packet : core.take(**event)) server.publish(packet);
   }
+  if (stop.stop_requested()) return {};
   if (reader->cut_short()) spdlog::warn("{}: ends inside a block, as after a power cut", recording.string());
-  return {};
+  if (reader->sha256() == sha256) return {};
+  return Error{Errc::bad_format,
+               fmt::format("{}: was changed while it was played: what was shown is not what was "
+                           "admitted; take a copy that is as it was written, where only you can write",
+                           recording.string())};
 }
 
 }  // namespace birdseye::device

@@ -193,16 +193,21 @@ Result<std::string> signed_text(const calibration::FieldMap& map, const calibrat
 }
 
 void run(const CLI::App& field, const CalibrateFieldOptions& options, CommandStatus& status) {
+  std::vector<std::filesystem::path> sources = options.pair;
+  sources.push_back(options.poses);
+  const auto source = admit_sources(sources, options.results);
+  if (!source) return status.refuse(source.error());
   calibration::Identity tracker;
   if (!options.bind.empty()) {
     auto told = ask_hardware(options.bind, {"tracker"});
     if (!told) return status.refuse(told.error());
     tracker = (*told)["tracker"];
   }
-  const auto fitted = fit(field, options);
+  auto fitted = fit(field, options);
   if (!fitted) return status.refuse(fitted.error());
   for (const std::string& line : by_kind(fitted->rejected)) print_line(fmt::format("rejected {}", line));
-  const Verdict verdict = verdict_of(fitted->fit);
+  Verdict verdict = verdict_of(fitted->fit);
+  if (const std::string doubt = tell_doubts(*source, {}, verdict); !doubt.empty()) fitted->made_from += "; " + doubt;
   fmt::print("{} of order {}: {:.2f} mm before, {:.2f} mm after, held out\n", name_of(fitted->fit.chosen.basis),
              fitted->fit.chosen.order, fitted->fit.before_mm, fitted->fit.held_out_mm);
   const calibration::FieldMapNotes notes{
@@ -246,6 +251,8 @@ void add_calibrate_field(CLI::App& calibrate, CommandStatus& status) {
                    "an appliance whose tracker the field is of; with another one birdseyed uses no pose")
       ->type_name("[NAME@]HOST:PORT");
   add_result_options(*field, options->results, "the map, for [calibration] field of birdseyed (JSON)", false);
+  field->add_flag("--accept-unsigned", options->results.accept_unsigned,
+                  "go on also from a recording that is not signed, or signed by a machine that is not known here");
   CLI::App* check = add_calibrate_field_check(*field, status);
   field->callback([options, field, check, &status] {
     if (!field->got_subcommand(check)) run(*field, *options, status);

@@ -276,7 +276,8 @@ void run(const CLI::App& command, CalibrateHandEyeOptions& options, CommandStatu
     if (!read) return status.refuse(read.error());
     angles = *std::move(read);
   }
-  const auto source = admit_source(options.recording, options.results);
+  const auto source =
+      admit_sources({options.recording, files.poses, files.board_poses, files.eye_poses}, options.results);
   if (!source) return status.refuse(source.error());
   auto recording =
       options.live || !options.recording.empty() ? record_live(options, *source) : read_hand_eye_stations(files);

@@ -187,7 +187,7 @@ void run(const CLI::App& command, const CalibrateLatencyOptions& options, Comman
     const auto fits = check_bound_record(options.paths.record, options.server, {"tracker", "camera"});
     if (!fits) return status.refuse(fits.error());
   }
-  const auto recording = admit_source(options.recording, options.paths);
+  const auto recording = admit_sources({options.recording, options.poses, options.eye_poses}, options.paths);
   if (!recording) return status.refuse(recording.error());
   const auto field = admit_field(options.poses_are.field, options.server, options.paths);
   if (!field) return status.refuse(field.error());

@@ -151,7 +151,7 @@ void add_calibrate_tip(CLI::App& calibrate, CommandStatus& status) {
   allow_unsigned_sources(tip);
   tip.callback([options, &tip, &status] {
     if (const auto fine = check(tip, *options); !fine) return status.refuse(fine.error());
-    const auto source = admit_source(options->poses, options->results);
+    const auto source = admit_sources({options->poses, options->spin}, options->results);
     if (!source) return status.refuse(source.error());
     const auto field = admit_field(options->poses_are.field, options->server, options->results);
     if (!field) return status.refuse(field.error());

@@ -77,11 +77,18 @@ void allow_unsigned_sources(CLI::App& command) {
       "not known here");
 }
 
-Result<AdmittedRecording> admit_source(const std::filesystem::path& recording, const ResultPaths& paths) {
-  if (recording.empty()) return AdmittedRecording();
-  const auto authors = Authors::of_this_machine(paths.accept_unsigned);
-  if (!authors) return authors.error();
-  return admit_recording(recording, *authors);
+Result<AdmittedRecording> admit_sources(const std::vector<std::filesystem::path>& sources, const ResultPaths& paths) {
+  AdmittedRecording out;
+  for (const auto& source : sources) {
+    if (source.empty()) continue;
+    const auto authors = Authors::of_this_machine(paths.accept_unsigned);
+    if (!authors) return authors.error();
+    auto admitted = admit_recording(source, *authors);
+    if (!admitted) return admitted.error();
+    if (out.doubt.empty()) out.doubt = std::move(admitted->doubt);
+    if (out.events_sha256.empty()) out.events_sha256 = std::move(admitted->events_sha256);
+  }
+  return out;
 }
 
 Result<AdmittedField> admit_field(const std::filesystem::path& map, const std::string& server,

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "calibration/base/verdict.hpp"
 #include "host/app/commands.hpp"
@@ -29,8 +30,9 @@ void add_result_options(CLI::App& command, ResultPaths& paths, const std::string
 /// --record.
 void allow_unsigned_sources(CLI::App& command);
 
-/// Whose recording a calibration goes by, by the rule for all recordings. Of an empty path, nobody's.
-Result<AdmittedRecording> admit_source(const std::filesystem::path& recording, const ResultPaths& paths);
+/// Whose recordings a calibration goes by, by the rule for all recordings: those of these paths that are recordings,
+/// for files of poses may be such, too. The first doubt, and the sum of the first's events. An empty path is nobody's.
+Result<AdmittedRecording> admit_sources(const std::vector<std::filesystem::path>& sources, const ResultPaths& paths);
 /// Whose map of the field it corrects poses by, likewise, or whose map the appliance at `server` has corrected them by.
 /// map, server: empty where there is none.
 Result<AdmittedField> admit_field(const std::filesystem::path& map, const std::string& server,

@@ -83,6 +83,24 @@ TEST(Replay, NoBitOfASignatureMakesARecordingOneThatNobodySigned) {
     EXPECT_EQ(refusal(scratch.file("cut.berec", text.substr(0, at)), true), "") << at - payload;
 }
 
+TEST(Replay, ARecordingThatIsChangedBetweenAdmissionAndItsEndEndsWithAnError) {
+  const Scratch scratch;
+  const std::string path = scratch.file("r.berec", recording_text(scratch / "r"));
+  const auto admitted = admit_replay(path, false);
+  ASSERT_TRUE(admitted) << admitted.error().what;
+  const auto server = *wire::Server::listen("127.0.0.1", 0);
+  EXPECT_TRUE(replay(path, *admitted, *server, {}));
+  // One block less is as sound to the reader: nothing but the sum tells.
+  const std::string text = contents_of(path);
+  const Bytes eighth = block_of(RawEvent(TrackerBytes{{{0x80, 8}, DeviceTime{8}}}));
+  const std::size_t at = text.find(std::string(eighth.begin(), eighth.end()));
+  ASSERT_NE(at, std::string::npos);
+  (void)scratch.file("r.berec", text.substr(0, at) + text.substr(at + eighth.size()));
+  const auto played = replay(path, *admitted, *server, {});
+  ASSERT_FALSE(played);
+  EXPECT_NE(played.error().what.find("was changed while it was played"), std::string::npos) << played.error().what;
+}
+
 TEST(Replay, AnEventThatIsAnHourLaterIsDamaged) {
   const Scratch scratch;
   RecordConfig config;
@@ -96,7 +114,7 @@ TEST(Replay, AnEventThatIsAnHourLaterIsDamaged) {
       (*recorder)->take(TrackerBytes{{{0x80}, DeviceTime{} + Duration::from_seconds(at_s)}});
   }
   const auto server = *wire::Server::listen("127.0.0.1", 0);
-  const auto played = replay(path, *server, {});
+  const auto played = replay(path, *admit_replay(path, false), *server, {});
   ASSERT_FALSE(played);
   EXPECT_NE(played.error().what.find("3 h later"), std::string::npos) << played.error().what;
 }

@@ -148,6 +148,31 @@ TEST(VerifyCommand, OfAnApplianceRecordingSeesEachByte) {
   expect(scratch.file("cut.berec", text.substr(0, text.size() - 1)), 3, {"not signed", "cut short"});
 }
 
+/// A calibration that went by it would be signed by this machine, and the change with it.
+TEST(VerifyCommand, ACalibrationTakesNoPosesOfARecordingThatItWouldRefuse) {
+  const Scratch scratch;
+  record_session(scratch / "changed");
+  (void)scratch.file("changed/tracker.igs.mha", "put in later");
+  {
+    const auto writer = host::RecordingWriter::create({.folder = scratch / "nobodys", .source = "test"});
+    ASSERT_TRUE(writer && (*writer)->finish("the test is over"));
+  }
+  const std::string other = scratch.file("other.csv", "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n");
+  for (const std::string name : {"changed", "nobodys"}) {
+    const std::string folder = (scratch / name).string();
+    for (const std::string& command :
+         {"tip --poses " + folder, "tip --poses " + other + " --spin " + folder,
+          "latency --poses " + folder + " --eye-poses " + other, "latency --poses " + other + " --eye-poses " + folder,
+          "hand-eye --poses " + folder + " --eye-poses " + other,
+          "hand-eye --poses " + other + " --eye-poses " + folder, "field --pair " + other + " " + folder,
+          "field --grid-spec 2x2x2:100x100x100mm --poses " + folder}) {
+      testing::expect_refused("birdseye", "calibrate " + command,
+                              {name, name == "changed" ? "since the recording was signed: tracker.igs.mha"
+                                                       : "is not signed: nobody says who wrote it"});
+    }
+  }
+}
+
 TEST(VerifyCommand, RefusesWhatItCannotJudge) {
   const Scratch scratch;
   testing::expect_refused("birdseye", "verify " + (scratch / "none").string(), {"no such file or folder"});
