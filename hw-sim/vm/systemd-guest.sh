@@ -167,4 +167,4 @@ echo "== purge"
 apt-get purge -y birdseyed
 code=$?
 say purge code $code files "$(find /etc /usr /lib /run -xdev \( -name '*birdseye*' -o -path '*/birdseye/*' \) -not -path '/run/bird*' -not -path '/run/udev/*' | sort)" \
-  recordings "$(ls /var/lib/birdseye | grep -c berec)" user "$(id -nu birdseye)" status "$(dpkg-query -W -f '${Status}' birdseyed 2>/dev/null)"
+  recordings "$(ls /var/lib/birdseye | grep -c berec)" key "$(ls -d /var/lib/birdseye/identity 2>/dev/null)" user "$(id -nu birdseye)" status "$(dpkg-query -W -f '${Status}' birdseyed 2>/dev/null)"

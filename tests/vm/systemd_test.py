@@ -37,8 +37,8 @@ STEPS = {
     "upgrade": {**WELL, "code": "0", "version": r".*\+later", "restarted": "yes", "configuration": "# a line of its owner"},
     "remove": {"code": "0", "active": "inactive", "program": "", "unit": "", "configuration": "birdseyed.toml", "recordings": "[1-9].*",
                "runtime": ""},
-    # What was recorded stays, and with it the user whose it is.
-    "purge": {"code": "0", "files": "", "recordings": "[1-9].*", "user": "birdseye", "status": ""},
+    # What was recorded stays, and with it the user whose it is. The key goes.
+    "purge": {"code": "0", "files": "", "recordings": "[1-9].*", "key": "", "user": "birdseye", "status": ""},
 }
 
 
