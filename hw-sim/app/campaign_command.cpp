@@ -7,6 +7,7 @@
 #include <string>
 
 #include "drivers/system/local_programs.hpp"
+#include "hw-sim/app/number_option.hpp"
 #include "hw-sim/campaign/campaign.hpp"
 
 namespace birdseye::hw_sim {
@@ -39,18 +40,28 @@ Result<void> parse_seeds(const std::string& text, SeedRun& settings) {
   return Error{Errc::bad_value, "--seeds " + text + ": give FIRST:LAST, as 1:2000, up to 1000000000"};
 }
 
-void print(const SeedRun& settings, const OperationResult& sum) {
+void print(const SeedRun& settings, const StudiedOperations& operations, const OperationResult& sum) {
   const auto share = [](std::uint64_t some, std::uint64_t all) {
     return all > 0 ? 100.0 * static_cast<double>(some) / static_cast<double>(all) : 0;
   };
   fmt::print("{}", sum.broken);
-  fmt::print("of seeds {} to {}: {:.0f} minutes, {} faults ({} of them alone), {} poses, {} frames\n",
-             settings.first_seed, settings.last_seed, sum.minutes, sum.faults, sum.faults_alone, sum.poses, sum.frames);
+  fmt::print("{}", words_by_fault(sum));
+  fmt::print("{} of the {} seeds from {} to {}: {:.0f} minutes, {} faults ({} of them alone), {} poses, {} frames\n",
+             sum.operations, settings.last_seed - settings.first_seed + 1, settings.first_seed, settings.last_seed,
+             sum.minutes, sum.faults, sum.faults_alone, sum.poses, sum.frames);
+  fmt::print(
+      "{} registrations by views, {} deformations, {} checks; transmitter or patient moved {} times without a "
+      "reference, {} of them while no overlay was whole\n",
+      sum.registrations, sum.deformations, sum.checks, sum.moved, sum.moved_unwatched);
   fmt::print(
       "overlay whole on {:.1f} % of pictures, {:.4f} % of those beyond 1.5 circles, worst {:.2f}; oldest {:.0f} ms\n",
-      share(sum.green, sum.shown), share(sum.beyond, sum.green), sum.worst_circles, sum.worst_age_ms);
+      share(sum.green, sum.shown), share(sum.beyond, sum.judged), sum.worst_circles, sum.worst_age_ms);
   fmt::print("worst pose {:.2f} of what it may be off; {}\n", sum.worst_pose, words_of_faults(sum));
   fmt::print("{}\n", words_of_laws(sum));
+  if (sum.laws_broken > 0) {
+    fmt::print("birdseye-sim operation --seed SEED --minutes {}{} --shortest prints the fewest faults that break one\n",
+               operations.minutes, operations.pictures ? " --pictures" : "");
+  }
 }
 
 /// A line, at once.
@@ -69,7 +80,9 @@ Result<void> run_operations(const SeedRun& settings, const StudiedOperations& op
   if (*results == nullptr) return {};
   const auto sum = sum_of(**results, settings.first_seed, settings.last_seed);
   if (!sum) return sum.error();
-  print(settings, *sum);
+  if (sum->operations == 0)
+    return Error{Errc::timeout, "no seed was run to its end, so nothing was judged; give it more time (--at-most)"};
+  print(settings, operations, *sum);
   broken = sum->laws_broken > 0;
   return {};
 }
@@ -111,7 +124,7 @@ void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
       ->required();
   CLI::Option* const minutes =
       command.add_option("--minutes", options->operations.minutes, "how long each operation is")
-          ->check(CLI::Range(0.5, 600.0));
+          ->check(number_within(0.5, 600.0));
   CLI::Option* const pictures = command.add_flag("--pictures", options->operations.pictures,
                                                  "the video of each operation shows what the scope sees");
   command
@@ -120,7 +133,7 @@ void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
       ->check(CLI::Range(1, 1024));
   command.add_flag("--alone", options->alone, "run all seeds here, whatever has started this program beside others");
   command.add_option("--at-most", options->settings.at_most_s, "seconds after which no seed begins")
-      ->check(CLI::Range(1.0, 1e6));
+      ->check(number_within(1.0, 1e6));
   CLI::Option* const other =
       command
           .add_option("command", options->command,
@@ -131,7 +144,7 @@ void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
   command
       .add_option("--patience", options->patience_s, "seconds that the command may take for one seed (default 3600)")
       ->needs(other)
-      ->check(CLI::Range(1.0, 1e6));
+      ->check(number_within(1.0, 1e6));
   command.callback([options, take, &broken] { take(run(*options, broken)); });
 }
 

@@ -6,12 +6,14 @@
 #include <tbb/info.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "host/files/write_files.hpp"
+#include "hw-sim/app/number_option.hpp"
 #include "hw-sim/campaign/operation_results.hpp"
 #include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/operation/operation.hpp"
@@ -46,8 +48,10 @@ OperationResult result_of(const SimulatedOperation& operation, const OperationOu
   result.shown = laws.shown;
   result.overlaid = laws.overlaid;
   result.green = laws.green;
+  result.judged = laws.judged;
   result.beyond = laws.beyond;
   result.registrations = out.registrations;
+  result.deformations = out.deformations;
   result.checks = out.checks;
   result.moved = laws.moved;
   result.moved_unwatched = laws.moved_unwatched;
@@ -56,6 +60,8 @@ OperationResult result_of(const SimulatedOperation& operation, const OperationOu
   result.worst_circles = laws.worst_circles;
   result.slowest_named_s = laws.slowest_named_s;
   result.slowest_over_s = laws.slowest_over_s;
+  for (const auto& [name, of] : laws.by_fault)
+    result.by_fault[name] = {of.befell, of.judged, of.slowest_named_s, of.slowest_over_s};
   return result;
 }
 
@@ -76,8 +82,9 @@ Result<void> print_shortest(const SimulatedOperation& operation, const Operation
   if (!breaks(script)) shorter.minutes = operation.minutes;
   script = shortest_script(script, breaks);
   if (failed) return *failed;
-  fmt::print("# {} is broken within {:.2f} minutes of seed {} by:\n{}", law, shorter.minutes, operation.seed,
-             text_of(script));
+  fmt::print("# {} is broken by this script: birdseye-sim operation --seed {} --minutes {:.2f}{}{} --script FILE\n{}",
+             law, operation.seed, std::ceil(100 * shorter.minutes) / 100, operation.pictures ? " --pictures" : "",
+             fmt::format(" --reference {}", out.reference ? "patient" : "none"), text_of(script));
   return {};
 }
 
@@ -88,14 +95,14 @@ void print(const OperationOutcome& out, const OperationResult& result) {
       "seed {}: {:g} minutes, {} faults ({} of them alone), {} poses, {} frames, {} registrations, {} deformations, {} "
       "checks\n",
       result.seed, result.minutes, result.faults, result.faults_alone, result.poses, result.frames,
-      result.registrations, out.deformations, result.checks);
+      result.registrations, result.deformations, result.checks);
   fmt::print("reference: {}{}\n", out.reference ? "patient" : "none",
              out.laws.moved == 0
                  ? ""
                  : fmt::format("; transmitter or patient moved {} times, {} of them while no overlay was whole",
                                out.laws.moved, out.laws.moved_unwatched));
   fmt::print("overlay whole on {:.1f} % of pictures, {} of {} beyond 1.5 circles, worst {:.2f}; oldest {:.0f} ms\n",
-             100 * share, result.beyond, result.green, result.worst_circles, result.worst_age_ms);
+             100 * share, result.beyond, result.judged, result.worst_circles, result.worst_age_ms);
   fmt::print("worst pose {:.2f} of what it may be off; {}\n", result.worst_pose, words_of_faults(result));
   fmt::print("{}; hash {}\n", words_of_laws(result), result.hash);
 }
@@ -129,7 +136,7 @@ void add_operation_command(CLI::App& app, const Take& take, bool& broken) {
   CLI::App& command = *app.add_subcommand(
       "operation", "one operation in virtual time, with faults at random: whether anything breaks a law");
   command.add_option("--seed", options->operation.seed, "everything random follows from it");
-  command.add_option("--minutes", options->operation.minutes, "how long it is")->check(CLI::Range(0.5, 600.0));
+  command.add_option("--minutes", options->operation.minutes, "how long it is")->check(number_within(0.5, 600.0));
   command.add_flag("--pictures", options->operation.pictures,
                    "the video shows what the scope sees, and the window watches how it moves");
   command

@@ -1,6 +1,7 @@
 #include "hw-sim/campaign/seed_runner.hpp"
 
 #include <fmt/format.h>
+#include <signal.h>
 #include <tbb/info.h>
 
 #include <algorithm>
@@ -35,6 +36,19 @@ std::vector<std::string> command_for(const SeedStudy& study, std::uint64_t seed)
   return out;
 }
 
+/// Empty where it ended as a program does that has said all: with 0, or with what says that its verdict is bad. An
+/// error: it was ended from outside, as where memory ran short: nothing is known of the seed.
+Result<std::string> fault_of_end(const std::optional<int>& code) {
+  constexpr int kSignal = 128, kBadVerdict = 3;
+  if (!code) return std::string("it did not end in time");
+  if (*code == kSignal + SIGKILL || *code == kSignal + SIGTERM || *code == kSignal + SIGINT) {
+    return Error{Errc::disconnected,
+                 fmt::format("its program was ended by signal {}, as where memory is short", *code - kSignal)};
+  }
+  if (*code > kSignal) return fmt::format("its program crashed, with signal {}", *code - kSignal);
+  return *code == 0 || *code == kBadVerdict ? std::string() : fmt::format("its program ended with {}", *code);
+}
+
 /// An error: nothing can be run at all.
 Result<Outcome> run_one(const SeedStudy& study, const std::filesystem::path& log, std::uint64_t seed) {
   auto child = ChildProcess::start(command_for(study, seed), log, ChildProcess::Pipe::stdout_from_child,
@@ -42,11 +56,15 @@ Result<Outcome> run_one(const SeedStudy& study, const std::filesystem::path& log
   if (!child) return child.error();
   const Deadline deadline = Deadline::after(study.patience);
   const auto line = child->read_line(deadline);
+  if (line && !*line) return Outcome{seed, study.kept(seed, Error{Errc::timeout, "none in time"})};
+  const auto fault = fault_of_end(child->wait(deadline));
+  if (!fault) return Outcome{seed, fault.error()};
   if (!line) {
-    return Outcome{seed, study.kept(seed, Error{Errc::disconnected, fmt::format("none; {} says why", log.string())})};
+    return Outcome{seed, study.kept(seed, Error{Errc::disconnected,
+                                                fmt::format("none: {}; {} may say why",
+                                                            fault->empty() ? "it ended" : *fault, log.string())})};
   }
-  if (!*line) return Outcome{seed, study.kept(seed, Error{Errc::timeout, "none in time"})};
-  (void)child->wait(deadline);
+  if (!fault->empty()) return Outcome{seed, study.kept(seed, Error{Errc::bad_value, *fault})};
   return Outcome{seed, study.kept(seed, **line)};
 }
 

@@ -3,6 +3,7 @@
 #include <bitset>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,7 +29,8 @@ struct BrokenLaw {
 /// - pose: no pose is given as good that is off by more than 6 sigma of what it says of itself, nor one of a bird that
 ///   is turned by more than 6 sigma of the tracker's noise.
 /// - age: no overlay is on the screen whose frame was exposed more than 150 ms ago.
-/// - setup: no overlay is drawn with the calibration of a scope that is not the one in use.
+/// - setup: no overlay is drawn with the calibration of a scope that is not the one in use, nor by a registration that
+///   nobody has confirmed, that something speaks against, or that is held back.
 /// - circle: no overlay is shown as whole that is off by more than three circles, and of a thousand one at most by more
 ///   than one and a half. This is not asked of frames that are exposed while the scope turns in its holder or the lens
 ///   is zoomed, and 0.1 s after; nor, without a reference, while transmitter or patient move. Where these move while no
@@ -43,8 +45,8 @@ struct BrokenLaw {
 /// - accused: later than 10 s after the last fault's end the window does not begin to say that video and poses differ.
 /// - kept: a window that is opened again takes up what the one before had as it was last neither writing nor said that
 ///   something was not kept, or what it had later: the registration with its deformation, and the calibration over the
-///   board. It draws nothing before a landmark has been checked. A window that cannot keep something says so within 2
-///   s.
+///   board. It draws nothing before a landmark has been checked. What was taken back, and nothing else was kept, it
+///   does not take up. A window that cannot keep something says so within 2 s.
 /// - memory: it does not grow later than two minutes after the beginning, and 30 s after the first matching of the CT
 ///   with the video begins.
 class OperationLaws {
@@ -72,14 +74,21 @@ class OperationLaws {
   /// At the end: until_s is when the operation ended.
   void finish(double until_s);
 
+  /// Of faults of one kind on one target.
+  struct OfFault {
+    std::uint64_t befell = 0, judged = 0;            ///< judged: those that befell alone
+    double slowest_named_s = 0, slowest_over_s = 0;  ///< from where the fault itself began and ended
+  };
   struct Figures {
-    std::uint64_t poses = 0, frames = 0, frames_posed = 0, shown = 0, overlaid = 0, green = 0, beyond = 0;
+    /// judged: of the green ones, those whose place the law of circles is asked of.
+    std::uint64_t poses = 0, frames = 0, frames_posed = 0, shown = 0, overlaid = 0, green = 0, judged = 0, beyond = 0;
     double worst_pose = 0;     ///< of a pose, in parts of what it may be off
     double worst_age_ms = 0;   ///< of an overlay
     double worst_circles = 0;  ///< of a green overlay
     std::uint64_t faults = 0, faults_judged = 0;
-    std::uint64_t moved = 0, moved_unwatched = 0;  ///< how often transmitter or patient were, without a reference
-    double slowest_named_s = 0, slowest_over_s = 0;
+    std::uint64_t moved = 0, moved_unwatched = 0;    ///< how often transmitter or patient were, without a reference
+    double slowest_named_s = 0, slowest_over_s = 0;  ///< less what the fault's signs allow
+    std::map<std::string, OfFault> by_fault;         ///< "camera stale"
   };
   [[nodiscard]] const Figures& figures() const { return figures_; }
   [[nodiscard]] const std::vector<BrokenLaw>& broken() const { return broken_; }
@@ -90,6 +99,7 @@ class OperationLaws {
     FaultTarget of;
     FaultSigns signs;
     double begins_s = 0, ends_s = 0;
+    double own_end_s = 0;  ///< before what follows of the fault
     bool alone = true;
     std::optional<double> named_s, poses_again_s, frames_again_s;
     std::bitset<3> birds_again{};  ///< those that have had a pose since its end
@@ -107,6 +117,7 @@ class OperationLaws {
   };
   [[nodiscard]] double at_s(std::int64_t ns) const { return static_cast<double>(ns - zero_ns_) * 1e-9; }
   void break_law(double at_s, const char* law, std::string what);
+  static std::string name_of(const Span& span);
   void judge_pose(const char* of, std::size_t bird, const Transform<Tracker, Sensor>& told, double true_s, double now_s,
                   double own_mm, double time_s);
   /// Whether a fault of the world begins or ends about then.
@@ -144,6 +155,9 @@ class OperationLaws {
   std::optional<double> unsaid_since_s_;  ///< a sync failed then, and the window has not said so
   /// What was kept last, and what was found since. Empty: nothing was kept, or it may have been taken back.
   std::vector<Found> kept_;
+  bool nothing_kept_ = true;      ///< there is no registration on the disk: none was found, or it was taken back
+  bool none_to_take_up_ = false;  ///< this window was opened so, and nothing was touched since
+  bool in_doubt_ = false;         ///< the registration is, or is held back
   std::optional<double> may_calibrate_since_s_;    ///< all is there for it
   std::optional<std::size_t> checks_when_opened_;  ///< of a window that takes up; empty: one was checked since
   Figures figures_;

@@ -19,6 +19,7 @@ void OperationLaws::opened(std::size_t checks) {
   accused_ = false;
   to_take_up_ = !kept_.empty();
   board_to_take_up_ = board_kept_;
+  none_to_take_up_ = nothing_kept_;
   stood_still();
   checks_when_opened_ = to_take_up_ ? std::optional(checks) : std::nullopt;
 }
@@ -47,6 +48,11 @@ void OperationLaws::judge_calibration_kept(const host::OperationView& view, doub
 
 void OperationLaws::judge_registration_kept(const host::OperationView& view, double now_s) {
   using host::LiveStep;
+  if (!view.touches.empty()) none_to_take_up_ = false;
+  if (none_to_take_up_ && view.note(LiveStep::fiducials).done) {
+    none_to_take_up_ = false;
+    break_law(now_s, "kept", "the window was opened again, and has a registration, where none was kept");
+  }
   if (!to_take_up_) return;
   const bool asks = view.asks_for_instruments || view.asks_for_patient;
   // As long as it is not known whether the instruments are the same it is held back, and not lost.
@@ -70,7 +76,7 @@ void OperationLaws::judge_registration_kept(const host::OperationView& view, dou
 std::optional<OperationLaws::Found> OperationLaws::found_in(const host::OperationView& view, double now_s) {
   // Before, the window holds what it found with the former scope.
   if (view.note(host::LiveStep::calibrate).done) scope_ = truth_.scope_in_use(now_s);
-  if (!view.note(host::LiveStep::fiducials).done || !view.fre_mm) return std::nullopt;
+  if (!view.fre_mm) return std::nullopt;  // three touches register, though the step asks for a fourth
   return Found{*view.fre_mm, view.deformed ? view.deformed->made_utc : std::string(), scope_};
 }
 
@@ -87,10 +93,12 @@ void OperationLaws::take_kept(const host::OperationView& view, std::uint64_t fai
                               HostTime now) {
   const double now_s = at_s(now.ns);
   const bool all_kept = !view.writing && view.fault.empty() && !powerless;
+  in_doubt_ = view.unconfirmed || view.registration_held_back;
   board_kept_ |= all_kept && begins_at_board_ && view.note(host::LiveStep::calibrate).done;
   // What a window has not taken up yet is there all the same.
   if (!to_take_up_) {
     const std::optional<Found> found = found_in(view, now_s);
+    nothing_kept_ = !found && !view.registration_held_back && (nothing_kept_ || all_kept);
     // Nobody has taken back what is held back.
     if ((all_kept || !found) && !view.registration_held_back) kept_.clear();
     if (found && std::ranges::count(kept_, *found) == 0 && (all_kept || !kept_.empty())) kept_.push_back(*found);

@@ -19,6 +19,7 @@ OperationResult result_of_seed(std::uint64_t seed) {
   result.poses = 100 * seed;
   result.green = seed;
   result.worst_circles = 0.1 * static_cast<double>(seed);
+  result.by_fault["camera unplug"] = {seed, 1, 0.1 * static_cast<double>(seed), 0.5};
   return result;
 }
 
@@ -46,7 +47,21 @@ TEST(SeedResults, AreReadBackAddedUpAndKeptOncePerSeed) {
   EXPECT_EQ(sum->minutes, 7.5);
   EXPECT_EQ(sum->laws_broken, 1U);
   EXPECT_DOUBLE_EQ(sum->worst_circles, 0.3);
+  EXPECT_EQ(sum->operations, 3U);
+  EXPECT_EQ(words_by_fault(*sum),
+            "  camera unplug                         6,     3 judged, named within 0.30 s, over within "
+            "0.50 s of its end\n");
   EXPECT_EQ(sum->broken, "seed 2: 12.000 s pose: scope is 20.0 mm off\n");
+}
+
+TEST(SeedResults, ARowThatIsNotOfItsSeedIsToldAndMayBeRunAgain) {
+  const Scratch scratch;
+  const auto results = SeedResults::open(scratch / "o.sqlite", "operations of 2.5 minutes");
+  ASSERT_TRUE(results && (*results)->enter({{1, line_of(result_of_seed(1))}, {2, line_of(result_of_seed(1))}}));
+  const auto sum = sum_of(**results, 1, 2);
+  ASSERT_FALSE(sum);
+  EXPECT_NE(sum.error().what.find("seed 2: is of seed 1; delete its row"), std::string::npos) << sum.error().what;
+  EXPECT_TRUE(sum_of(**results, 1, 1));
 }
 
 TEST(SeedResults, OfAnotherLengthAreNotMixedIn) {
@@ -63,6 +78,9 @@ TEST(OperationResults, ALineIsReadBackAndAnythingElseRefused) {
   ASSERT_TRUE(back) << back.error().what;
   EXPECT_EQ(line_of(*back), line_of(result_of_seed(7)));
   for (const char* const line : {"", "{}", "no JSON", "{\"seed\": \"seven\"}"}) EXPECT_FALSE(result_of(line)) << line;
+  std::string below = line_of(result_of_seed(7));
+  const std::string count = "\"laws_broken\":";
+  EXPECT_FALSE(result_of(below.insert(below.find(count) + count.size(), "-1")));
 }
 
 TEST(OperationResults, WordsSayWhereNothingWasJudgedAndWhereMoreLawsMayBeBroken) {
@@ -185,6 +203,29 @@ TEST(Campaign, TriesAgainWhatGaveNoLineOfJson) {
   ASSERT_TRUE(all) << all.error().what;
   EXPECT_EQ(said, "2 of 2\n");
   EXPECT_EQ(all_lines(**all), "1 1\n2 2\n3 3\n");
+}
+
+/// As where memory runs short: that says nothing of the seed.
+TEST(Campaign, TriesAgainWhatWasEndedFromOutside) {
+  const Scratch scratch;
+  SeedStudy study = *study_of_operations({.minutes = kMinutes}, "/bin/true");
+  study.command = {"sh", "-c", "kill -KILL $$"};
+  const auto ended = run_seeds(study, up_to(scratch, 1), hear_nothing);
+  ASSERT_FALSE(ended);
+  EXPECT_NE(ended.error().what.find("ended by signal 9"), std::string::npos) << ended.error().what;
+  EXPECT_TRUE(SeedResults::open(scratch / "campaign/operations.sqlite", study.what).value()->seeds()->empty());
+}
+
+/// What it said before may be of half of its work.
+TEST(Campaign, ALineOfWhatDidNotEndWellCountsForNothing) {
+  const Scratch scratch;
+  for (const auto& [script, why] :
+       {std::pair{"echo {}; exit 1", "ended with 1"}, {"echo {}; kill -ABRT $$", "signal 6"}}) {
+    const auto ended = run_seeds(by_shell(script), up_to(scratch, 1), hear_nothing);
+    ASSERT_FALSE(ended) << script;
+    EXPECT_NE(ended.error().what.find(why), std::string::npos) << ended.error().what;
+    std::filesystem::remove_all(scratch / "campaign");
+  }
 }
 
 TEST(Campaign, EndsWhereTheProgramIsNotThere) {

@@ -165,5 +165,27 @@ TEST(OperationLaws, AWindowThatForgetsTheRegistrationOrHasAnotherIsFound) {
   EXPECT_EQ(broken_after(0.7), 0U) << "it may have been written whole";
 }
 
+TEST(OperationLaws, AWindowThatHasWhatWasTakenBackIsFound) {
+  const OperationTruth truth(1, 96, 72, Happenings(), false);
+  host::OperationView none, registered;
+  registered.fre_mm = 0.5;
+  registered.notes[static_cast<std::size_t>(host::LiveStep::fiducials)].done = true;
+  const auto broken_after = [&](bool written, bool touched) {
+    OperationLaws laws(
+        truth, {}, [](std::uint64_t) { return std::nullopt; }, 0);
+    laws.take_kept(registered, 0, false, {0});
+    none.writing = !written;
+    laws.take_kept(none, 0, false, {0});
+    laws.opened(0);
+    host::OperationView has = registered;
+    if (touched) has.touches.emplace_back();
+    laws.take(has, 0, {5'000'000'000});
+    return laws.broken().size();
+  };
+  EXPECT_EQ(broken_after(true, false), 1U);
+  EXPECT_EQ(broken_after(true, true), 0U) << "somebody registered anew";
+  EXPECT_EQ(broken_after(false, false), 0U) << "what was there before may still be on the disk";
+}
+
 }  // namespace
 }  // namespace birdseye::hw_sim
