@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -103,7 +104,7 @@ ChildProcess::~ChildProcess() {
   stop();
 }
 
-void ChildProcess::close_input() {
+void ChildProcess::close_pipe() {
   fd_ = UniqueFd();
 }
 
@@ -164,6 +165,12 @@ std::optional<int> ChildProcess::wait(Deadline deadline) {
     pid_ = -1;
   }
   return exit_code_;
+}
+
+void ChildProcess::bound_memory(std::uint64_t bytes) {
+  if (pid_ <= 0) return;  // to the system, 0 is ourselves
+  const rlimit limit{bytes, bytes};
+  (void)::prlimit(pid_, RLIMIT_AS, &limit, nullptr);
 }
 
 void ChildProcess::stop() {

@@ -2,6 +2,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -38,11 +39,15 @@ class ChildProcess {
   Result<std::size_t> read(void* bytes, std::size_t size, Deadline deadline);
   /// All of bytes to the child's standard input, or why not.
   Result<void> write(const void* bytes, std::size_t size, Deadline deadline);
-  void close_input();
+  /// Closes our end of the pipe: the child's input ends, or what it writes fails.
+  void close_pipe();
 
   /// The exit code (128 + signal if it was killed); empty if it still runs at the deadline.
   std::optional<int> wait(Deadline deadline);
   void stop();
+  /// Bounds the address space that the child may have from now on, as far as the system lets us. What it asks for
+  /// beyond that it does not get.
+  void bound_memory(std::uint64_t bytes);
   [[nodiscard]] pid_t pid() const { return pid_; }
 
  private:

@@ -84,6 +84,12 @@ Result<void> RecordingReader::open_sequence() {
   if (!opened) return opened.error();
   sequence_ = *std::move(opened);
   const auto& transforms = sequence_->header().transforms;
+  if (transforms.size() > kMostBirds) {
+    return Error{Errc::unsupported,
+                 fmt::format("{}: has transforms of {} names where a tracker has {} sensors at most; keep those of the "
+                             "scope and the other tools, and leave the rest out",
+                             path_.string(), transforms.size(), kMostBirds)};
+  }
   scope_ = settings_.transform;
   if (scope_.ends_with(kTransformField)) scope_.resize(scope_.size() - kTransformField.size());
   if (scope_.empty()) scope_ = transforms.size() == 1 ? *transforms.begin() : transform_name("scope");
@@ -143,12 +149,12 @@ Result<void> RecordingReader::make_events(std::size_t number, const SequenceHead
   wire::Birds birds{acquired, {}};
   wire::VideoFrame frame;
   frame.info.pose.reason = scope_ + " missing";
-  for (const std::string& transform : sequence_->header().transforms) {
+  for (const auto& [key, text] : fields) {
+    if (!key.ends_with(kTransformField)) continue;
+    const std::string transform = key.substr(0, key.size() - kTransformField.size());
     const std::string_view status = value_of(fields, transform + std::string(kTransformStatusField));
-    const auto text = fields.find(transform + std::string(kTransformField));
-    if (text == fields.end()) continue;
-    ReadPose pose =
-        status.empty() || status == kStatusOk ? read_matrix(text->second, 1) : ReadPose{{}, std::string(status)};
+    const ReadPose pose =
+        status.empty() || status == kStatusOk ? read_matrix(text, 1) : ReadPose{{}, std::string(status)};
     if (pose.problem.empty()) birds.birds.push_back({bird_name(transform), pose.tracker_from_sensor});
     if (transform != scope_) continue;
     frame.info.pose.reason = pose.problem.empty() ? "" : scope_ + " " + pose.problem;
@@ -203,11 +209,13 @@ Result<void> RecordingReader::open_video(const std::string& name, const wire::Vi
     sequence_ = *std::move(opened);
     return {};
   }
-  auto film = FilmReader::open(path_ / (name + ".mp4"), frame.width_px / 2 * 2, frame.height_px / 2 * 2);
-  if (!film) {
+  const fs::path file = path_ / (name + ".mp4");
+  if (!fs::exists(file, ignored)) {
     return Error{Errc::not_found,
                  fmt::format("{}: lacks the video, {}.igs.mha, .igs.mhd or .mp4", path_.string(), name)};
   }
+  auto film = FilmReader::open(file, frame.width_px / 2 * 2, frame.height_px / 2 * 2);
+  if (!film) return film.error();
   film_ = *std::move(film);
   return {};
 }
@@ -219,18 +227,19 @@ Result<bool> RecordingReader::fetch_pixels(wire::VideoFrame& frame, const FrameP
       return Error{Errc::bad_value, fmt::format("{}: names a file elsewhere, {}", path_.string(), place.file)};
     if (auto opened = open_video(place.file, frame); !opened) return opened.error();
   }
-  if (sequence_ && place.index >= sequence_->frames()) return false;
   auto rgb = sequence_ ? sequence_->read(place.index) : film_->read(place.index);
-  if (!rgb && film_ && rgb.error().code == Errc::bad_format) return false;
+  if (!rgb && rgb.error().code == Errc::bad_format) return false;
   if (!rgb) return rgb.error();
-  if (sequence_ && (frame.width_px != sequence_->width_px() || frame.height_px != sequence_->height_px())) {
-    return Error{Errc::bad_format, fmt::format("{}: frame {} is said to be {}x{}, and the file of its pixels is {}x{}",
-                                               path_.string(), place.index, frame.width_px, frame.height_px,
-                                               sequence_->width_px(), sequence_->height_px())};
-  }
   if (film_) {  // whose sizes are even
     frame.width_px = frame.width_px / 2 * 2;
     frame.height_px = frame.height_px / 2 * 2;
+  }
+  const int width_px = sequence_ ? sequence_->width_px() : film_->width_px();
+  const int height_px = sequence_ ? sequence_->height_px() : film_->height_px();
+  if (frame.width_px != width_px || frame.height_px != height_px) {
+    return Error{Errc::bad_format,
+                 fmt::format("{}: frame {} is said to be {}x{}, and the file of its pixels is {}x{}", path_.string(),
+                             place.index, frame.width_px, frame.height_px, width_px, height_px)};
   }
   frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(*std::move(rgb));
   return true;

@@ -9,6 +9,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/durable.hpp"
+#include "host/files/frame_size.hpp"
 #include "host/files/sequence_header.hpp"
 #include "host/files/write_files.hpp"
 #include "host/recording/recording_signature.hpp"
@@ -20,8 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kUsualRateHz = 25;
-/// More than any tracker has: names are what somebody sends.
-constexpr std::size_t kMostBirds = 64;
 constexpr std::size_t kMostVideos = 20;  // a file each
 /// No two birds are this close: each has a housing, and mostly an instrument around it.
 constexpr double kSameBirdMm = 5;
@@ -198,6 +197,12 @@ Result<void> RecordingWriter::write_frame(const wire::VideoFrame& frame) {
 }
 
 Result<void> RecordingWriter::add_frame(const wire::VideoFrame& frame) {
+  if (!is_frame_size(frame.width_px, frame.height_px)) {
+    return Error{Errc::unsupported,
+                 fmt::format("frames of {}x{} px are larger than those that are recorded ({} px at most): set the "
+                             "camera to a smaller size",
+                             frame.width_px, frame.height_px, kMostFramePixels)};
+  }
   note_time(frame.info.acquired);
   if (last_sequence_ && frame.info.sequence > *last_sequence_ + 1)
     figures_.frames_missing += frame.info.sequence - *last_sequence_ - 1;

@@ -23,6 +23,9 @@ inline constexpr const char* kRecordingTracker = "tracker";  ///< .igs.mha
 inline constexpr const char* kRecordingVideo = "video";      ///< .igs.mha, or .igs.mhd and .raw, or .mp4; video-2 ...
 inline constexpr int kRecordingVersion = 1;
 
+/// The most birds whose poses are in a sequence: more than any tracker has. Their names are what somebody sends.
+inline constexpr std::size_t kMostBirds = 64;
+
 struct RecordingSettings {
   std::filesystem::path folder = {};
   std::string source = {};                          ///< whom it was recorded from, as HOST:PORT

@@ -8,6 +8,8 @@
 #include <optional>
 #include <sstream>
 
+#include "host/files/frame_size.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -75,18 +77,6 @@ struct SequenceReader::Pixels {
     }
     return inflate_to(to.data(), to.size()) == to.size();
   }
-
-  /// How many bytes there are, of no more than `most`.
-  std::uint64_t count(std::uint64_t most) {
-    std::vector<std::uint8_t> sink(1U << 18U);
-    while (at < most) {
-      if (inflate_to(sink.data(), static_cast<std::size_t>(std::min<std::uint64_t>(sink.size(), most - at))) == 0)
-        break;
-    }
-    const std::uint64_t found = at;
-    rewind();
-    return found;
-  }
 };
 
 SequenceReader::SequenceReader(fs::path path, SequenceHeader header)
@@ -124,6 +114,12 @@ Result<void> SequenceReader::take_layout() {
                    fmt::format("pixels of {} {} where 8 bits, grey or RGB (MET_UCHAR, 1 or 3 channels), are read",
                                channels.empty() ? "1" : channels, type));
   }
+  if (!is_frame_size(width, height)) {
+    return refused(Errc::unsupported, path_,
+                   fmt::format("its frames are {}x{} px, more than a camera's {} px at most; record or write it anew "
+                               "with smaller pictures",
+                               width, height, kMostFramePixels));
+  }
   channels_ = channels == "3" ? 3 : 1;
   // Marked or unmarked side first, far or near row first, as PLUS names them; a third letter is of volumes.
   const std::string_view orientation = value_of(fields, "UltrasoundImageOrientation");
@@ -158,23 +154,27 @@ Result<void> SequenceReader::find_pixels() {
                            static_cast<std::uint64_t>(height_px_);
   pixels_->rewind();
   const std::uint64_t size = fs::file_size(file, ignored);
-  const std::uint64_t there = pixels_->compressed     ? pixels_->count(told_ * frame_bytes)
-                              : size > pixels_->begin ? size - pixels_->begin
-                                                      : 0;
-  whole_ = static_cast<std::size_t>(std::min<std::uint64_t>(told_, there / frame_bytes));
+  const std::uint64_t there = size > pixels_->begin ? size - pixels_->begin : 0;
+  // A compressed file may unpack to a thousand times its size: read() finds its end, frame by frame.
+  whole_ = pixels_->compressed ? told_ : static_cast<std::size_t>(std::min<std::uint64_t>(told_, there / frame_bytes));
   return {};
 }
 
 Result<std::vector<std::uint8_t>> SequenceReader::read(std::size_t index) {
-  if (index >= whole_) {
+  const auto missing = [&] {
     return refused(Errc::bad_format, path_,
                    fmt::format("has no frame {}: {} of {} frames are whole", index, whole_, told_));
-  }
+  };
+  if (index >= whole_) return missing();
   const auto width = static_cast<std::size_t>(width_px_), height = static_cast<std::size_t>(height_px_);
   const auto channels = static_cast<std::size_t>(channels_);
   std::vector<std::uint8_t> bytes(width * height * channels);
-  if (!pixels_->read(index * bytes.size(), bytes))
-    return refused(Errc::unreadable, path_, fmt::format("frame {} cannot be read any more", index));
+  if (!pixels_->read(index * bytes.size(), bytes)) {
+    if (!pixels_->compressed)
+      return refused(Errc::unreadable, path_, fmt::format("frame {} cannot be read any more", index));
+    whole_ = static_cast<std::size_t>(pixels_->at / bytes.size());
+    return missing();
+  }
   if (channels == 3 && !mirrored_ && !from_below_) return bytes;
   std::vector<std::uint8_t> rgb(width * height * 3);
   for (std::size_t y = 0; y < height; ++y) {

@@ -14,7 +14,8 @@ namespace birdseye::host {
 /// compressed by zlib, of our making or of PLUS's.
 class SequenceReader {
  public:
-  /// Refuses, naming the file: what is no such sequence, of other pixels or in an orientation that is not a picture's.
+  /// Refuses, naming the file: what is no such sequence, of other pixels, of more than kMostFramePixels or in an
+  /// orientation that is not a picture's.
   static Result<SequenceReader> open(const std::filesystem::path& path);
   SequenceReader(SequenceReader&&) noexcept;
   SequenceReader& operator=(SequenceReader&&) noexcept;
@@ -23,11 +24,12 @@ class SequenceReader {
   [[nodiscard]] const SequenceHeader& header() const { return header_; }
   [[nodiscard]] int width_px() const { return width_px_; }
   [[nodiscard]] int height_px() const { return height_px_; }
-  /// How many whole frames the file holds: fewer than the header tells of where the file was cut.
+  /// How many whole frames the file holds: fewer than the header tells of where the file was cut. Of a compressed file
+  /// that is known only once read() has come to its end; before, it is what the header tells.
   [[nodiscard]] std::size_t frames() const { return whole_; }
 
   /// The frame at index, RGB, rows from the top. In a compressed file all frames before it must be decompressed too,
-  /// unless frames are read in order.
+  /// unless frames are read in order. Errc::bad_format: the file ends before it.
   Result<std::vector<std::uint8_t>> read(std::size_t index);
 
  private:

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 
 namespace birdseye {
 namespace {
@@ -39,8 +40,21 @@ TEST(ChildProcess, TakesItsInputToTheEnd) {
   ASSERT_TRUE(child);
   const std::string input(300'000, 'x');
   ASSERT_TRUE(child->write(input.data(), input.size(), Deadline::after(kLong)));
-  child->close_input();
+  child->close_pipe();
   EXPECT_EQ(child->wait(Deadline::after(kLong)), 0);
+}
+
+TEST(ChildProcess, ItsMemoryIsBoundedAndOursIsNot) {
+  rlimit before{}, after{};
+  ASSERT_EQ(::getrlimit(RLIMIT_AS, &before), 0);
+  auto child = shell("read go && test \"$(ulimit -v)\" -eq 65536", ChildProcess::Pipe::stdin_to_child);
+  ASSERT_TRUE(child);
+  child->bound_memory(std::uint64_t{64} << 20U);
+  ASSERT_TRUE(child->write("go\n", 3, Deadline::after(kLong)));
+  EXPECT_EQ(child->wait(Deadline::after(kLong)), 0);
+  child->bound_memory(1);  // it has ended
+  ASSERT_EQ(::getrlimit(RLIMIT_AS, &after), 0);
+  EXPECT_EQ(after.rlim_cur, before.rlim_cur);
 }
 
 TEST(ChildProcess, OneThatIsNotThereIsAnError) {

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "drivers/system/clock.hpp"
+#include "host/files/film.hpp"
 #include "host/recording/recording_reader.hpp"
 #include "host/recording/recording_writer.hpp"
 #include "host/recording/sequence_writer.hpp"
@@ -245,6 +246,71 @@ TEST(Recording, ACompressedOneHasAllFramesAndAllEvents) {
     if (f == nullptr) continue;
     EXPECT_NEAR((*f->rgb)[3000], (*std::get<wire::VideoFrame>(events[i]).rgb)[3000], 4) << i;
   }
+}
+
+/// A compressed recording of 8 frames of 64x48.
+void record_film(const fs::path& folder) {
+  record(folder, session(8, 64, 48), {.compressed = true});
+  ASSERT_TRUE(fs::exists(folder / "video.mp4"));
+}
+
+void put_film(const fs::path& path, int width_px, int height_px, int frames) {
+  auto film = Film::open(path, width_px, height_px, 25);
+  ASSERT_TRUE(film) << film.error().what;
+  for (int n = 0; n < frames; ++n) ASSERT_TRUE(film->add(*frame(n, width_px, height_px).rgb));
+  ASSERT_TRUE(film->finish());
+}
+
+TEST(Recording, AFilmOfAnotherSizeThanItsEventsIsRefused) {
+  const Scratch scratch;
+  record_film(scratch / "r");
+  put_film(scratch / "r/video.mp4", 48, 64, 8);
+  const Played other = play(scratch / "r");
+  EXPECT_EQ(other.ending.code, Errc::bad_value);
+  for (const char* word : {"video.mp4", "48x64 px", "64x48 px"})
+    EXPECT_NE(other.ending.what.find(word), std::string::npos) << other.ending.what;
+  std::ofstream(scratch / "r/video.mp4") << "no film";
+  const Played none = play(scratch / "r");
+  EXPECT_EQ(none.ending.code, Errc::unreadable);
+  EXPECT_NE(none.ending.what.find("video.mp4"), std::string::npos) << none.ending.what;
+  put_film(scratch / "r/video.mp4", 64, 48, 3);
+  const Played cut = play(scratch / "r");
+  EXPECT_NE(cut.ending.what.find("3 frames are whole, 5 more"), std::string::npos) << cut.ending.what;
+}
+
+TEST(Recording, AFrameOfAnotherSizeThanItsFilmIsRefused) {
+  const Scratch scratch;
+  record_film(scratch / "r");
+  const std::string lines = contents_of(scratch / "r/events.jsonl"), told = "\"width_px\":64";
+  const auto last = lines.rfind(told);
+  ASSERT_NE(last, std::string::npos);
+  const auto put = [&](std::size_t at, const std::string& width) {
+    std::ofstream(scratch / "r/events.jsonl") << std::string(lines).replace(at, told.size(), "\"width_px\":" + width);
+  };
+  put(last, "1024");
+  const Played larger = play(scratch / "r");
+  EXPECT_EQ(larger.ending.code, Errc::bad_format);
+  EXPECT_NE(larger.ending.what.find("frame 7 is said to be 1024x48, and the file of its pixels is 64x48"),
+            std::string::npos)
+      << larger.ending.what;
+  for (const char* width : {"-64", "0", "2000000000"}) {
+    put(lines.find(told), width);
+    const Played none = play(scratch / "r");
+    EXPECT_EQ(none.ending.code, Errc::bad_value) << width;
+    EXPECT_NE(none.ending.what.find("video.mp4"), std::string::npos) << none.ending.what;
+  }
+}
+
+TEST(Recording, FramesThatAreTooLargeToPlayAreNotRecorded) {
+  const Scratch scratch;
+  auto writer = RecordingWriter::create({.folder = scratch / "r", .source = "test"});
+  ASSERT_TRUE(writer) << writer.error().what;
+  wire::VideoFrame large = frame(0, 16, 12);
+  large.width_px = 4096;
+  large.height_px = 4097;
+  const auto added = (*writer)->add(large);
+  ASSERT_FALSE(added);
+  EXPECT_NE(added.error().what.find("4096x4097 px"), std::string::npos) << added.error().what;
 }
 
 TEST(Recording, AnotherSizeBeginsAnotherFile) {

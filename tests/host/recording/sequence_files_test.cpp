@@ -6,7 +6,10 @@
 #include <fstream>
 #include <random>
 
+#include "drivers/video/frame_source.hpp"
+#include "host/files/frame_size.hpp"
 #include "host/files/pose_files.hpp"
+#include "host/recording/recording_reader.hpp"
 #include "host/recording/sequence_reader.hpp"
 #include "host/recording/sequence_writer.hpp"
 #include "tests/support/data.hpp"
@@ -38,6 +41,8 @@ SequenceWriter::Fields fields(int n, bool seen = true) {
           {"ScopeToTrackerTransform", transform_text(some_pose(n))},
           {"ScopeToTrackerTransformStatus", seen ? "OK" : "INVALID"}};
 }
+
+static_assert(kMostFramePixels == drivers::kMostPixels, "what an appliance sends can be recorded and played");
 
 constexpr int kWidth = 7, kHeight = 5;
 constexpr std::size_t kBytes = 3 * kWidth * kHeight;
@@ -185,7 +190,31 @@ TEST(SequenceFiles, GreyCompressedAndTurnedPicturesOfPlusAreRead) {
   auto cut = SequenceReader::open(scratch.file(
       "d.igs.mha", header("CompressedData = False", "CompressedData = True") + zipped.substr(0, zipped.size() / 2)));
   ASSERT_TRUE(cut) << cut.error().what;
+  const auto beyond = cut->read(1);
+  ASSERT_FALSE(beyond);
+  EXPECT_EQ(beyond.error().code, Errc::bad_format);
   EXPECT_LT(cut->frames(), 2U);
+  EXPECT_NE(beyond.error().what.find("of 2 frames are whole"), std::string::npos) << beyond.error().what;
+}
+
+TEST(SequenceFiles, CompressedFramesAreUnpackedWhenTheyAreAskedFor) {
+  const Scratch scratch;
+  std::string text = header("CompressedData = False", "CompressedData = True");
+  text.replace(text.find("LOCAL"), 5, "pixels.zraw");
+  // There are no pixels yet: opening looks at none.
+  (void)scratch.file("pixels.zraw", "");
+  auto reader = SequenceReader::open(scratch.file("a.igs.mhd", text));
+  ASSERT_TRUE(reader) << reader.error().what;
+  std::vector<Bytef> zip(200);
+  uLongf size = zip.size();
+  const std::string pixels = "0123456789abcdef";
+  ASSERT_EQ(::compress(zip.data(), &size, reinterpret_cast<const Bytef*>(pixels.data()), pixels.size()), Z_OK);
+  (void)scratch.file("pixels.zraw", std::string(reinterpret_cast<const char*>(zip.data()), size));
+  for (const std::size_t n : {std::size_t{1}, std::size_t{0}}) {
+    const auto rgb = reader->read(n);
+    ASSERT_TRUE(rgb) << rgb.error().what;
+    EXPECT_EQ((*rgb)[0], n == 0 ? '0' : '8');
+  }
 }
 
 TEST(SequenceFiles, WhatCannotBeReadIsNamed) {
@@ -201,14 +230,47 @@ TEST(SequenceFiles, WhatCannotBeReadIsNamed) {
   expect("4 2 2", "4 2", "DimSize = 4 2 is");
   expect("4 2 2", "4 -2 2", "DimSize");
   expect("4 2 2", "99999999 2 2", "DimSize");
+  expect("4 2 2", "16384 16384 2", "16384x16384 px, more than a camera's 16777216 px");
+  expect("4 2 2", "4096 4097 2", "4096x4097 px");
   expect("MET_UCHAR", "MET_SHORT", "MET_SHORT");
   expect("NumberOfChannels = 1", "NumberOfChannels = 4", "pixels of 4");
   expect("MFA", "FMA", "orientation is FMA");
   expect("= LOCAL", "= gone.raw", "gone.raw");
   expect("= LOCAL", "= /etc/passwd", "/etc/passwd");
   expect("= LOCAL", "= .", "is not beside it");
+  EXPECT_TRUE(SequenceReader::open(scratch.file("large.igs.mha", header("4 2 2", "4096 4096 2"))));
   EXPECT_FALSE(SequenceReader::open(scratch / "none.igs.mha"));
   EXPECT_FALSE(SequenceWriter::create(scratch / "no folder", "video", 2, 2));
+}
+
+/// A sequence without pictures: each frame has one transform, of a name that no other has.
+std::string sequence_of_names(std::size_t names) {
+  std::string text = "ObjectType = Image\nNDims = 3\nDimSize = 0 0 " + std::to_string(names) + "\n";
+  for (std::size_t n = 0; n < names; ++n) {
+    const std::string field = "Seq_Frame" + std::to_string(n) + "_";
+    text += field + "T" + std::to_string(n) + "ToTrackerTransform = 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n";
+    text += field + "Timestamp = " + std::to_string(n) + "\n";
+  }
+  return text + "ElementDataFile = LOCAL\n";
+}
+
+TEST(SequenceFiles, ARecordingHasNoMoreTransformsThanATrackerHasSensors) {
+  const Scratch scratch;
+  const RecordingReader::Settings settings{.transform = "T0ToTracker"};
+  const auto all = RecordingReader::open(scratch.file("all.igs.mha", sequence_of_names(64)), settings);
+  ASSERT_TRUE(all) << all.error().what;
+  for (std::size_t n = 0; n < 64; ++n) {
+    const auto event = (*all)->next(Deadline::after(Duration::from_ms(60'000)));
+    ASSERT_TRUE(event && *event) << n;
+    const auto& birds = std::get<wire::Birds>(**event).birds;
+    ASSERT_EQ(birds.size(), 1U) << "those of its own frame";
+    EXPECT_EQ(birds[0].name, "t" + std::to_string(n));
+  }
+  const auto more = RecordingReader::open(scratch.file("more.igs.mha", sequence_of_names(65)), settings);
+  ASSERT_FALSE(more);
+  EXPECT_EQ(more.error().code, Errc::unsupported);
+  for (const char* word : {"more.igs.mha", "65 names", "64 sensors", "leave the rest out"})
+    EXPECT_NE(more.error().what.find(word), std::string::npos) << more.error().what;
 }
 
 TEST(SequenceFiles, APlusRecordingIsRead) {
