@@ -159,11 +159,14 @@ Result<void> ProcessCopy::give(const void* data, std::size_t size, Deadline dead
 ProcessCopy::ProcessCopy(ProcessCopy&& other) noexcept
     : process_(std::exchange(other.process_, -1)),
       maker_(other.maker_),
+      ended_by_(other.ended_by_),
       fd_(std::move(other.fd_)),
       to_(std::move(other.to_)) {}
 
 ProcessCopy::~ProcessCopy() {
-  fd_ = UniqueFd();  // a copy that waits for room in its pipe ends by that, also where it may not be killed
+  // A copy that waits for room in its pipe, or for what it is given, ends by that, also where it may not be killed.
+  fd_ = UniqueFd();
+  to_ = UniqueFd();
   kill();
 }
 
@@ -184,7 +187,7 @@ Error ProcessCopy::ended() {
   }
   process_ = -1;
   if (WIFSIGNALED(*status)) {
-    const int signal = WTERMSIG(*status);
+    const int signal = ended_by_ = WTERMSIG(*status);
     return {Errc::disconnected, fmt::format("ended by signal {} ({})", signal, ::strsignal(signal))};
   }
   if (WEXITSTATUS(*status) != 0) return {Errc::disconnected, "gave up"};

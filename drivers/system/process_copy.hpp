@@ -54,6 +54,8 @@ class ProcessCopy {
   /// which is seen within a twentieth of a second and kills it too.
   Result<void> receive(void* to, std::size_t size, Deadline deadline, const std::stop_token& stop = {});
   [[nodiscard]] pid_t pid() const { return process_; }
+  /// The signal that ended it, as receive() or give() said; 0: none is known.
+  [[nodiscard]] int ended_by() const { return ended_by_; }
 
  private:
   ProcessCopy(pid_t process, UniqueFd fd, UniqueFd to)
@@ -64,6 +66,7 @@ class ProcessCopy {
   Error ended();
 
   pid_t process_, maker_;
+  int ended_by_ = 0;
   UniqueFd fd_;  ///< what it sends
   UniqueFd to_;  ///< what it is given; none where it does not listen
 };

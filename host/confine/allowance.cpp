@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
+#include <system_error>
 
 #include "calibration/base/lower_case.hpp"
 
@@ -24,18 +26,37 @@ fs::path resolved(const fs::path& path) {
   return failed ? path : real;
 }
 
-/// Whether a file's voxels may lie in another file beside it.
-bool is_header(const fs::path& file) {
-  constexpr std::array kHeaders{".mhd", ".nhdr", ".hdr", ".img"};
-  return std::ranges::find(kHeaders, lower_case(file.extension().string())) != kHeaders.end();
+/// Of the regular files that `at` gives, until there are too many. each: whether each is an input of its own.
+template <typename Iterator>
+bool add_files(Iterator at, std::error_code& failed, bool each, std::size_t most, Readable& readable) {
+  for (; !failed && at != Iterator(); at.increment(failed)) {
+    std::error_code ignored;
+    if (!at->is_regular_file(ignored)) continue;  // a link to one is one
+    if (readable.files.size() == most) return false;
+    readable.files.push_back(at->path());
+    const std::uintmax_t bytes = size_of(at->path());
+    readable.bytes += bytes;
+    if (each) readable.processor_time = readable.processor_time + allowance_of(bytes).processor_time;
+  }
+  if (!each) readable.processor_time = allowance_of(readable.bytes).processor_time;
+  return true;
 }
 
-/// A file of a folder that is read, and what it leads to.
-void add_file(const fs::directory_entry& entry, Readable& readable) {
-  std::error_code ignored;
-  if (!entry.is_regular_file(ignored)) return;
-  if (entry.is_symlink(ignored)) readable.paths.push_back(resolved(entry.path()));
-  readable.bytes += size_of(entry.path());
+Result<Readable> of_folder(const fs::path& folder) {
+  constexpr std::size_t kMostFiles = 200'000;  // whoever reads them takes half of that
+  Readable readable{{}, folder, 0, {}};
+  std::error_code failed;
+  const fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, failed);
+  if (!add_files(at, failed, true, kMostFiles, readable))
+    return Error{Errc::unsupported,
+                 "holds over " + std::to_string(kMostFiles) + " files; give the folder of one patient"};
+  // An empty one takes its time too, and is told.
+  readable.processor_time = std::max(readable.processor_time, allowance_of(readable.bytes).processor_time);
+  return readable;
+}
+
+fs::path folder_of(const fs::path& file) {
+  return resolved(file.has_parent_path() ? file.parent_path() : fs::path("."));
 }
 
 }  // namespace
@@ -51,20 +72,32 @@ Allowance allowance_of(std::uintmax_t bytes) {
   return {kLeast_bytes + kTimes * kDeflate * counted, Duration::from_seconds(2 + unpacking_s + 0.5 * mb)};
 }
 
-Readable readable_for(const fs::path& input) {
+bool names_other_files(const fs::path& file) {
+  constexpr std::array kHeaders{".mhd", ".nhdr", ".hdr", ".hdr.gz"};
+  const std::string name = lower_case(file.filename().string());
+  return std::ranges::any_of(kHeaders, [&name](const char* ending) { return name.ends_with(ending); });
+}
+
+bool stands_for_folder(const fs::path& file) {
+  return lower_case(file.stem().string()) == "dicomdir";
+}
+
+Result<Readable> readable_for(const fs::path& input) {
   std::error_code failed;
   const fs::path real = resolved(input);
-  if (fs::is_directory(real, failed)) {
-    Readable readable{{real}, 0};
-    fs::recursive_directory_iterator at(real, fs::directory_options::skip_permission_denied, failed);
-    for (; !failed && at != fs::recursive_directory_iterator(); at.increment(failed)) add_file(*at, readable);
-    return readable;
+  if (fs::is_directory(real, failed)) return of_folder(real);
+  if (stands_for_folder(input)) return of_folder(folder_of(input));
+  if (!names_other_files(input)) {
+    const std::uintmax_t bytes = size_of(real);
+    return Readable{{real}, {}, bytes, allowance_of(bytes).processor_time};
   }
-  const fs::path folder = resolved(input.has_parent_path() ? input.parent_path() : fs::path("."));
-  if (!is_header(input)) return {{real, folder}, size_of(real)};
-  Readable readable{{real, folder}, 0};
-  fs::directory_iterator at(folder, fs::directory_options::skip_permission_denied, failed);
-  for (; !failed && at != fs::directory_iterator(); at.increment(failed)) add_file(*at, readable);
+  constexpr std::size_t kMostBeside = 10'000;  // a folder of scans has hundreds, and one of photographs thousands
+  Readable readable{{real}, {}, 0, {}};        // also where its folder cannot be listed
+  const fs::directory_iterator at(folder_of(input), fs::directory_options::skip_permission_denied, failed);
+  if (!add_files(at, failed, false, kMostBeside, readable))
+    return Error{Errc::unsupported, "lies among over " + std::to_string(kMostBeside) +
+                                        " files, any of which may hold its voxels; put it and those into a folder of "
+                                        "their own"};
   return readable;
 }
 

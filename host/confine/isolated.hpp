@@ -25,7 +25,8 @@ using Receive = std::function<bool(void* to, std::size_t size)>;
 /// decoders' libraries holds copies off meanwhile (CopiesHeldOff). The copy is killed where one receive of take waits
 /// for longer than `silence`, or when take returns, or when stop is requested: work may take as long as it needs if it
 /// sends meanwhile, and what take asks for is to be bounded. Errors: no process is free; and, where take asked for more
-/// than came, how the copy ended: Errc::timeout or Errc::disconnected, in words that go on from "its decoder".
+/// than came, how the copy ended: Errc::timeout or Errc::disconnected, in words that go on from "its decoder". For
+/// files that a decoder is given by their path, run_confined_to does this and confines the copy.
 Result<void> run_isolated(const std::function<void(const Send&)>& work, const std::function<void(const Receive&)>& take,
                           Duration silence, const std::stop_token& stop = {});
 

@@ -8,6 +8,7 @@
 #include "drivers/system/machine_time.hpp"
 #include "drivers/system/process_copy.hpp"
 #include "host/confine/confinement.hpp"
+#include "host/confine/run_confined_to.hpp"
 
 namespace birdseye::host {
 
@@ -16,9 +17,17 @@ namespace {
 constexpr Duration kLongest = Duration::from_ms(60'000);  // also of a decoder that waits, or of a very large file
 constexpr Duration kToAnswer = Duration::from_ms(90'000);
 
+constexpr std::size_t kLongestReason = 1 << 12;
+
 struct Request {
   ConfinedWork work = nullptr;
   std::size_t bytes = 0, most_bytes = 0;
+};
+
+/// What the copy sends before what it made, or before why it could not be confined.
+struct Made {
+  bool confined = false;
+  std::size_t bytes = 0;
 };
 
 struct Answer {
@@ -27,27 +36,32 @@ struct Answer {
   std::size_t bytes = 0;
 };
 
-Error of_decoder(Error error) {
-  error.what.insert(0, "its decoder ");
-  return error;
+Error of_decoder(const ProcessCopy& copy, const Error& error) {
+  Error how = how_it_ended(copy, error);
+  how.what.insert(0, "its decoder ");
+  if (how.code == Errc::unsupported) how.what += "; save it uncompressed, or smaller";
+  return how;
 }
 
 /// In a copy of the process that stands by.
 Result<std::string> run_in_copy(const Request& request, std::string_view input) {
   auto copy = ProcessCopy::start([&](const ProcessCopy::Send& send) {
-    confine_to_bytes(input.size());
-    const std::string made = request.work(input);
-    const std::size_t size = made.size();
-    send(&size, sizeof size);
-    send(made.data(), size);
+    const auto confined = confine_to_bytes(input.size());
+    const std::string made = confined ? request.work(input) : confined.error().what;
+    const Made head{confined.has_value(), made.size()};
+    send(&head, sizeof head);
+    send(made.data(), made.size());
   });
   if (!copy) return std::move(copy).error();
   const Deadline deadline = Deadline::after(kLongest);
-  std::size_t size = 0;
-  if (const auto came = copy->receive(&size, sizeof size, deadline); !came) return of_decoder(came.error());
-  if (size > request.most_bytes) return Error{Errc::bad_value, "its decoder gave more than such a file can hold"};
-  std::string made(size, '\0');
-  if (const auto came = copy->receive(made.data(), size, deadline); !came) return of_decoder(came.error());
+  Made head;
+  if (const auto came = copy->receive(&head, sizeof head, deadline); !came) return of_decoder(*copy, came.error());
+  if (head.bytes > (head.confined ? request.most_bytes : kLongestReason))
+    return Error{Errc::bad_value, "its decoder gave more than such a file can hold"};
+  std::string made(head.bytes, '\0');
+  if (const auto came = copy->receive(made.data(), made.size(), deadline); !came)
+    return of_decoder(*copy, came.error());
+  if (!head.confined) return Error{Errc::io, std::move(made)};
   return made;
 }
 

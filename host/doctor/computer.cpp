@@ -4,9 +4,11 @@
 #include <tbb/info.h>
 #include <unistd.h>
 
+#include <array>
 #include <fstream>
 #include <optional>
 #include <sstream>
+#include <string>
 
 #include "device/wire/clock_discipline.hpp"
 #include "host/confine/confinement.hpp"
@@ -97,12 +99,15 @@ std::vector<Check> check_decoder() {
   Check check{kComputer, "decoder of CTs", CheckState::bad, "", ""};
   struct {
     int word = 0;
-    Confinement confined;
+    bool is_confined = false, files = false;
+    std::array<char, 512> fault{};
   } came;
   static constexpr int kSent = 20'261'125;
   const auto ran = run_isolated(
       [](const Send& send) {
-        const decltype(came) sent{kSent, confine_to("/dev/null")};
+        const auto confined = confine_to("/dev/null");
+        decltype(came) sent{kSent, confined.has_value(), confined && confined->files, {}};
+        if (!confined) confined.error().what.copy(sent.fault.data(), sent.fault.size() - 1);
         send(&sent, sizeof sent);
       },
       [&](const Receive& receive) { (void)receive(&came, sizeof came); }, Duration::from_ms(4000));
@@ -111,13 +116,20 @@ std::vector<Check> check_decoder() {
     check.remedy = "close other programs: a process more must fit into memory and into this user's limit (ulimit -u)";
     return {check};
   }
-  const auto [system_calls, files] = came.confined;
-  check.state = system_calls && files ? CheckState::good : CheckState::could_be_better;
-  check.found = fmt::format("its process starts and ends; a damaged file can {} there, and {}",
-                            system_calls ? "start nothing and write nothing" : "do what this user can",
-                            files ? "read nothing else" : "read what this user can");
-  if (check.state != CheckState::good)
-    check.remedy = "run a kernel with seccomp filters and Landlock (Debian's has both), or read files you trust only";
+  if (!came.is_confined) {
+    const std::string fault = came.fault.data();
+    const auto remedy = fault.find("; ");
+    check.found = fmt::format("no CT, surface or picture is read: {}", fault.substr(0, remedy));
+    check.remedy = remedy == std::string::npos ? "start birdseye on another machine" : fault.substr(remedy + 2);
+    return {check};
+  }
+  check.state = came.files ? CheckState::good : CheckState::could_be_better;
+  check.found = fmt::format(
+      "its process starts and ends; a damaged file can start nothing and write nothing there, and of this user's files "
+      "read {}",
+      came.files ? "itself alone, and those that it may name: a header's beside it, a folder's in it"
+                 : "all, for this kernel has no Landlock");
+  if (!came.files) check.remedy = "run a kernel with Landlock, as Debian's, or read files you trust only";
   return {check};
 }
 

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 
 #include "calibration/base/result.hpp"
+#include "drivers/system/process_copy.hpp"
 #include "host/dicom/dicom_tree.hpp"
 #include "host/dicom/refused.hpp"
 #include "host/dicom/series.hpp"
@@ -19,12 +21,14 @@ struct DicomScan {
   DicomTree tree;
   std::vector<Series> series;
 };
-/// A directory file stands for its folder. Errc::not_found where there is no DICOM file.
+/// A directory file stands for its folder where it is named so (stands_for_folder). Errc::not_found where there is no
+/// DICOM file.
 Result<DicomScan> scan_dicom(const VolumeSource& source, const Announce& announce);
-/// copies: how many processes may decode at the same time.
-Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& announce, int copies);
+/// copies: processes that may decode at the same time, each of which does send_slices.
+Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& announce, std::span<ProcessCopy> copies);
 /// A DICOM segmentation, a folder that holds one, or a series whose values are labels.
-Result<ImageFile> decode_dicom_labels(const std::filesystem::path& path, const Announce& announce, int copies);
+Result<ImageFile> decode_dicom_labels(const std::filesystem::path& path, const Announce& announce,
+                                      std::span<ProcessCopy> copies);
 Result<ImageFile> decode_image_file(const VolumeSource& source, int components, GeometryFrom from);
 
 }  // namespace birdseye::host

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/confine/allowance.hpp"
 #include "host/dicom/series_choice.hpp"
 #include "host/volume/decode.hpp"
 #include "host/volume/decode_slices.hpp"
@@ -88,6 +89,11 @@ Result<DicomScan> scan_file(const VolumeSource& source, const Announce& announce
   auto file = read_dicom_file(source.path);
   if (!file) return file.error();
   if (file->kind == DicomFile::Kind::directory) {
+    // By its name: what a file holds must not say what else its decoder may read.
+    if (!stands_for_folder(source.path)) {
+      return refused(Errc::unsupported, source.path,
+                     "is the directory of a medium, and not named DICOMDIR; give the folder that holds the series");
+    }
     VolumeSource folder = source;
     folder.path = source.path.has_parent_path() ? source.path.parent_path() : fs::path(".");
     return scan_dicom(folder, announce);
@@ -120,7 +126,7 @@ Result<DicomScan> scan_dicom(const VolumeSource& source, const Announce& announc
   return scan;
 }
 
-Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& announce, int copies) {
+Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& announce, std::span<ProcessCopy> copies) {
   const auto scan = scan_dicom(source, announce);
   if (!scan) return scan.error();
   std::vector<SeriesInfo> infos;
@@ -141,7 +147,7 @@ Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& annou
                                  patient.name, patient.id, other.name, other.id));
     }
   }
-  auto hu = decode_slices(scan->tree.files, slices, compressed ? copies : 1, announce);
+  auto hu = decode_slices(scan->tree.files, slices, compressed ? copies : std::span<ProcessCopy>(), announce);
   if (!hu) return hu.error();
   announce(source.path);
   ImageFile image;

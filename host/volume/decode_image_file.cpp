@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "drivers/system/process_copy.hpp"
+#include "host/confine/allowance.hpp"
 #include "host/volume/decode.hpp"
 #include "host/volume/nifti_file.hpp"
 #include "host/volume/stated_geometry.hpp"
@@ -150,6 +151,10 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
     }
     if (nifti) {
       if (const std::string fault = nifti->type_fault(); !fault.empty()) return refused(Errc::unsupported, path, fault);
+      if (!nifti->holds_voxels() && !names_other_files(path)) {
+        return refused(Errc::unsupported, path,
+                       "keeps its voxels in another file, as only a header does: name it .hdr, beside its .img");
+      }
     }
     const GeometryGaps gaps = nifti ? nifti->gaps() : text_header_gaps(path);
     if (auto stated = check_stated(source, from, gaps); !stated) return stated.error();

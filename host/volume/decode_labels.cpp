@@ -29,7 +29,7 @@ Result<ImageFile> image_of_labels(const DicomFile& file) {
 
 }  // namespace
 
-Result<ImageFile> decode_dicom_labels(const fs::path& path, const Announce& announce, int copies) {
+Result<ImageFile> decode_dicom_labels(const fs::path& path, const Announce& announce, std::span<ProcessCopy> copies) {
   const auto scan = scan_dicom(path, announce);
   if (!scan) return scan.error();
   const DicomFile* found = nullptr;

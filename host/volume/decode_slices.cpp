@@ -1,15 +1,12 @@
 #include "host/volume/decode_slices.hpp"
 
-#include <fmt/format.h>
-
-#include <memory>
-#include <optional>
+#include <algorithm>
 #include <string>
+#include <utility>
 
-#include "drivers/system/process_copy.hpp"
 #include "host/confine/confinement.hpp"
 #include "host/dicom/dicom_pixels.hpp"
-#include "host/dicom/refused.hpp"
+#include "host/volume/decoder_process.hpp"
 
 namespace birdseye::host {
 
@@ -27,24 +24,54 @@ struct SliceHead {
   std::uint32_t length = 0;
 };
 
-/// In a copy: every so many slices from the first of its own.
-void send_share(const ProcessCopy::Send& send, const std::vector<DicomFile>& files,
-                const std::vector<DicomSlice>& slices, std::size_t first, std::size_t stride) {
-  DicomPixels pixels;
-  Hu hu;
+/// What a copy is given of a slice; its file's path follows.
+struct SliceTask {
+  std::int32_t frame = 0, columns = 0, rows = 0;
+  double slope = 1, intercept = 0;
+  std::uint32_t path_bytes = 0;
+};
+
+/// Every so many slices from the first on, for one copy: how many, then each.
+std::string share_of(const std::vector<DicomFile>& files, const std::vector<DicomSlice>& slices, std::size_t first,
+                     std::size_t stride) {
+  std::string share;
+  const auto append = [&share](const auto& value) {
+    share.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  append((slices.size() - first + stride - 1) / stride);
   for (std::size_t i = first; i < slices.size(); i += stride) {
-    hu.clear();
-    SliceHead head;
-    allow_time_for(files[slices[i].file].path);
-    if (const auto read = pixels.append_hu(files[slices[i].file].path, slices[i], hu); !read) {
-      head = {static_cast<std::int32_t>(read.error().code), static_cast<std::uint32_t>(read.error().what.size())};
-      send(&head, sizeof head);
-      send(read.error().what.data(), read.error().what.size());
-      return;
-    }
-    send(&head, sizeof head);
-    send(hu.data(), hu.size() * sizeof hu[0]);
+    const DicomSlice& slice = slices[i];
+    const std::string path = files[slice.file].path.string();
+    append(SliceTask{slice.frame, slice.columns, slice.rows, slice.slope, slice.intercept,
+                     static_cast<std::uint32_t>(path.size())});
+    share += path;
   }
+  return share;
+}
+
+struct Task {
+  std::string path;
+  DicomSlice slice;
+};
+
+/// All of a share, since whoever gives it takes no pixels before it has given all. False: no more will come.
+bool take_share(const ProcessCopy::Take& take, std::vector<Task>& tasks) {
+  std::size_t count = 0;
+  if (!take(&count, sizeof count)) return false;
+  for (std::size_t i = 0; i < count; ++i) {
+    SliceTask given;
+    if (!take(&given, sizeof given)) return false;
+    Task task;
+    task.path.resize(given.path_bytes);
+    if (!take(task.path.data(), task.path.size())) return false;
+    task.slice.frame = given.frame;
+    task.slice.columns = given.columns;
+    task.slice.rows = given.rows;
+    task.slice.slope = given.slope;
+    task.slice.intercept = given.intercept;
+    tasks.push_back(std::move(task));
+  }
+  return true;
 }
 
 Result<void> receive_slice(ProcessCopy& copy, Deadline deadline, std::int16_t* to, std::size_t count) {
@@ -71,16 +98,15 @@ Result<Hu> decode_alone(const std::vector<DicomFile>& files, const std::vector<D
 
 }  // namespace
 
-Result<Hu> decode_slices(const std::vector<DicomFile>& files, const std::vector<DicomSlice>& slices, int copies,
-                         const Announce& announce) {
-  const auto count = std::min(static_cast<std::size_t>(std::max(copies, 1)), slices.size());
+Result<Hu> decode_slices(const std::vector<DicomFile>& files, const std::vector<DicomSlice>& slices,
+                         std::span<ProcessCopy> copies, const Announce& announce) {
+  constexpr Duration kToTakeAShare = Duration::from_ms(10'000);
+  const std::size_t count = std::min(copies.size(), slices.size());
   if (count < 2) return decode_alone(files, slices, announce);
-  std::vector<ProcessCopy> started;
   for (std::size_t c = 0; c < count; ++c) {
-    auto copy =
-        ProcessCopy::start([&, c](const ProcessCopy::Send& send) { send_share(send, files, slices, c, count); });
-    if (!copy) return decode_alone(files, slices, announce);
-    started.push_back(*std::move(copy));
+    const std::string share = share_of(files, slices, c, count);
+    if (!copies[c].give(share.data(), share.size(), Deadline::after(kToTakeAShare)))
+      return decode_alone(files, slices, announce);
   }
   // In the order of the slices: while one copy is waited for, the others decode ahead by what their pipes hold.
   constexpr Duration kLongestOfASlice = Duration::from_ms(300'000);
@@ -89,15 +115,33 @@ Result<Hu> decode_slices(const std::vector<DicomFile>& files, const std::vector<
   for (std::size_t i = 0; i < slices.size(); ++i) {
     const auto& path = files[slices[i].file].path;
     announce(path);
-    auto came = receive_slice(started[i % count], Deadline::after(kLongestOfASlice), hu.data() + i * pixels, pixels);
-    if (!came && came.error().code == Errc::disconnected) {
-      return refused(
-          Errc::bad_format, path,
-          fmt::format("is damaged, or too large to decode (its decoder {}); copy it again", came.error().what));
-    }
+    ProcessCopy& copy = copies[i % count];
+    const auto came = receive_slice(copy, Deadline::after(kLongestOfASlice), hu.data() + i * pixels, pixels);
+    if (!came && (came.error().code == Errc::disconnected || came.error().code == Errc::timeout))
+      return not_decoded(path, how_it_ended(copy, came.error()));
     if (!came) return came.error();
   }
   return hu;
+}
+
+void send_slices(const ProcessCopy::Take& take, const ProcessCopy::Send& send) {
+  for (std::vector<Task> tasks; take_share(take, tasks); tasks.clear()) {
+    DicomPixels pixels;
+    Hu hu;
+    for (const auto& [path, slice] : tasks) {
+      hu.clear();
+      SliceHead head;
+      allow_time_for(path);
+      if (const auto read = pixels.append_hu(path, slice, hu); !read) {
+        head = {static_cast<std::int32_t>(read.error().code), static_cast<std::uint32_t>(read.error().what.size())};
+        send(&head, sizeof head);
+        send(read.error().what.data(), read.error().what.size());
+        return;
+      }
+      send(&head, sizeof head);
+      send(hu.data(), hu.size() * sizeof hu[0]);
+    }
+  }
 }
 
 }  // namespace birdseye::host

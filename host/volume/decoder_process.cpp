@@ -41,27 +41,29 @@ std::optional<Error> receive_text(const Receive& receive) {
   return told;
 }
 
-Error not_decoded(const fs::path& reading, const Result<void>& ran) {
-  if (!ran && ran.error().code == Errc::timeout) {
-    return refused(Errc::timeout, reading,
-                   fmt::format("its decoder {} after {:.0f} s on one file; copy it again, to a disk of this machine",
-                               ran.error().what, kLongestSilence.seconds()));
-  }
-  return refused(Errc::bad_format, reading,
-                 fmt::format("is cut short, damaged, or too large to decode{}; copy it again, or save it uncompressed",
-                             ran ? "" : fmt::format(" (its decoder {})", ran.error().what)));
-}
-
 }  // namespace
 
-Result<void> run_decoder(const fs::path& path, const std::function<Result<SendDecoded>(const Announce&)>& decode,
+Error not_decoded(const fs::path& file, const std::optional<Error>& how) {
+  if (how && how->code == Errc::timeout) {
+    return refused(Errc::timeout, file,
+                   fmt::format("its decoder {} after {:.0f} s on one file; copy it again, to a disk of this machine",
+                               how->what, kLongestSilence.seconds()));
+  }
+  if (how && how->code == Errc::unsupported)
+    return refused(Errc::unsupported, file, fmt::format("its decoder {}; save it uncompressed", how->what));
+  return refused(Errc::bad_format, file,
+                 fmt::format("is cut short, damaged, or too large to decode{}; copy it again, or save it uncompressed",
+                             how ? fmt::format(" (its decoder {})", how->what) : ""));
+}
+
+Result<void> run_decoder(const fs::path& path, const ConfinedCopies& copies, const Decode& decode,
                          const std::function<bool(const Receive&)>& take, const std::stop_token& stop) {
-  const auto work = [&](const Send& send) {
-    confine_to(path);
-    const auto decoded = decode([&send](const fs::path& file) {
+  const auto work = [&](const Send& send, std::vector<ProcessCopy>& made) {
+    const Announce announce = [&send](const fs::path& file) {
       send_text(send, MessageKind::reading, 0, file.string());
       allow_time_for(file);
-    });
+    };
+    const auto decoded = decode(announce, made);
     if (!decoded) {
       send_text(send, MessageKind::error, static_cast<std::int32_t>(decoded.error().code), decoded.error().what);
       return;
@@ -91,12 +93,12 @@ Result<void> run_decoder(const fs::path& path, const std::function<Result<SendDe
     }
   };
   try {
-    const auto ran = run_isolated(work, receive_all, kLongestSilence, stop);
+    const auto ran = run_confined_to(path, copies, work, receive_all, kLongestSilence, stop);
     if (stop.stop_requested()) return refused(Errc::disconnected, path, "was not read: cancelled");
     if (failed) return *failed;
     if (came) return {};
     if (!ran && ran.error().code == Errc::io) return refused(Errc::io, path, ran.error().what);
-    return not_decoded(reading, ran);
+    return not_decoded(reading, ran ? std::nullopt : std::optional(ran.error()));
   } catch (const std::bad_alloc&) {
     return refused(Errc::io, path, "needs more memory than there is; close other programs, or resample it");
   }

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 #include <tbb/info.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "host/volume/decode.hpp"
+#include "host/volume/decode_slices.hpp"
 #include "host/volume/decoder_process.hpp"
 #include "host/volume/nifti_label_names.hpp"
 #include "host/volume/series_list.hpp"
@@ -53,7 +56,7 @@ void send_image(const Send& send, const ImageFile& image) {
 }
 
 Result<ImageFile> decode(const VolumeSource& source, int components, GeometryFrom from, const Announce& announce,
-                         int copies) {
+                         std::span<ProcessCopy> copies) {
   const fs::path& path = source.path;
   if (holds_dicom(path)) {
     if (auto stated = check_stated(source, from, {}); !stated) return stated.error();
@@ -173,11 +176,12 @@ Result<void> check_geometry(const fs::path& path, const ImageFile& image) {
 }
 
 /// What decode gives, from a process of its own.
-Result<ImageFile> read_apart(const fs::path& path, int components, const std::stop_token& stop,
-                             const std::function<Result<ImageFile>(const Announce&)>& decode_file) {
+Result<ImageFile> read_apart(
+    const fs::path& path, int components, const std::stop_token& stop,
+    const std::function<Result<ImageFile>(const Announce&, std::span<ProcessCopy>)>& decode_file) {
   if (auto there = check_can_be_opened(path); !there) return there.error();
-  const auto work = [&](const Announce& announce) -> Result<SendDecoded> {
-    auto image = decode_file(announce);
+  const auto work = [&](const Announce& announce, std::span<ProcessCopy> copies) -> Result<SendDecoded> {
+    auto image = decode_file(announce, copies);
     if (!image) return image.error();
     if (image->components != components) return refused(Errc::unsupported, path, "is a CT; give a displacement field");
     return SendDecoded(
@@ -188,7 +192,11 @@ Result<ImageFile> read_apart(const fs::path& path, int components, const std::st
     image = receive_image(receive, components);
     return image.has_value();
   };
-  if (auto ran = run_decoder(path, work, take, stop); !ran) return ran.error();
+  // Made before it is known whether slices are compressed: each costs some milliseconds of a large program.
+  constexpr int kMostCopies = 16;
+  const int most = std::min(kMostCopies, tbb::info::default_concurrency());
+  const ConfinedCopies copies{holds_dicom(path) ? most : 0, send_slices};
+  if (auto ran = run_decoder(path, copies, work, take, stop); !ran) return ran.error();
   if (auto sound = check_geometry(path, *image); !sound) return sound.error();
   return *std::move(image);
 }
@@ -196,15 +204,14 @@ Result<ImageFile> read_apart(const fs::path& path, int components, const std::st
 }  // namespace
 
 Result<ImageFile> read_image(const VolumeSource& source, int components, const std::stop_token& stop) {
-  const int copies = tbb::info::default_concurrency();
   const GeometryFrom from = components == 1 ? GeometryFrom::file_or_person : GeometryFrom::file;
-  return read_apart(source.path, components, stop,
-                    [&](const Announce& announce) { return decode(source, components, from, announce, copies); });
+  return read_apart(source.path, components, stop, [&](const Announce& announce, std::span<ProcessCopy> copies) {
+    return decode(source, components, from, announce, copies);
+  });
 }
 
 Result<ImageFile> read_labels_file(const fs::path& path, const std::stop_token& stop) {
-  const int copies = tbb::info::default_concurrency();
-  return read_apart(path, 1, stop, [&](const Announce& announce) {
+  return read_apart(path, 1, stop, [&](const Announce& announce, std::span<ProcessCopy> copies) {
     return holds_dicom(path) ? decode_dicom_labels(path, announce, copies)
                              : decode(path, 1, GeometryFrom::file, announce, copies);
   });

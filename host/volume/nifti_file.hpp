@@ -37,6 +37,9 @@ class NiftiFile {
 
   [[nodiscard]] bool says_a_place() const;
 
+  /// Whether the file holds its voxels itself, and is no header of a pair.
+  [[nodiscard]] bool holds_voxels() const { return std::memcmp(header_.data() + 344, "n+1", 3) == 0; }
+
   /// Of a header that says two orientations, the place of the voxels by the one that a person says is right. Empty
   /// where it does not say two, or not exactly one of the two has these letters.
   [[nodiscard]] std::optional<VoxelPlace> place_by(const std::string& letters) const;

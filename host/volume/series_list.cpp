@@ -76,7 +76,7 @@ bool holds_dicom(const std::filesystem::path& path) {
 
 Result<SeriesList> list_series(const VolumeSource& source) {
   if (auto there = check_can_be_opened(source.path); !there) return there.error();
-  const auto work = [&source](const Announce& announce) -> Result<SendDecoded> {
+  const auto work = [&source](const Announce& announce, std::span<ProcessCopy>) -> Result<SendDecoded> {
     const auto scan = scan_dicom(source, announce);
     if (!scan) return scan.error();
     nlohmann::json json{{"series", nlohmann::json::array()}, {"unreadable", nlohmann::json::array()}};
@@ -92,7 +92,7 @@ Result<SeriesList> list_series(const VolumeSource& source) {
     if (text) list = list_from(*text);
     return list.has_value();
   };
-  if (auto ran = run_decoder(source.path, work, take); !ran) return ran.error();
+  if (auto ran = run_decoder(source.path, {}, work, take); !ran) return ran.error();
   return *std::move(list);
 }
 

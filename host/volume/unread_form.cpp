@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "calibration/base/lower_case.hpp"
+#include "host/confine/allowance.hpp"
 #include "host/volume/header_fields.hpp"
 
 namespace birdseye::host {
@@ -47,17 +48,31 @@ std::vector<std::string> listed_files(const fs::path& path, const std::string& l
   return names;
 }
 
-/// Which of the files of voxels beside a header is not there; empty where all are.
-std::string missing_file(const fs::path& header, const std::vector<std::string>& names) {
+/// Which of the files of voxels beside a header is not there, or lies in another folder, whose files the decoder may
+/// not read; empty where all are beside it. pattern: the one name stands for many.
+std::string missing_file(const fs::path& header, const std::vector<std::string>& names, bool pattern) {
   std::error_code error;
   for (const std::string& name : names) {
-    if (fs::is_regular_file(header.parent_path() / name, error)) continue;
+    if (fs::path(name).lexically_normal().has_parent_path()) {
+      return fmt::format(
+          "is a header whose voxels are in another folder (\"{}\"); put them beside it and give their names alone, or "
+          "save it as one file",
+          shown(name));
+    }
+    if (pattern || fs::is_regular_file(header.parent_path() / name, error)) continue;
     return fmt::format(
         "is a header whose voxels are in other files, of which \"{}\" is not there; copy them all, or save "
         "it as one file",
         shown(name));
   }
   return {};
+}
+
+/// Why a file may not keep its voxels in others: its name must say that it does, since its decoder may read those.
+std::string not_named_header(const fs::path& path, const char* ending) {
+  if (names_other_files(path)) return {};
+  return fmt::format("keeps its voxels in other files, as only a header does: name it {}, or save it as one file",
+                     ending);
 }
 
 /// Whether one of a NRRD's axes is that of the several values of a voxel, as of a displacement field's vectors.
@@ -129,9 +144,10 @@ std::string unread_nrrd(const fs::path& path, const HeaderFields& fields) {
     data = field_of(fields, "datafile");
     last = "datafile:";
   }
-  if (lower_case(data.substr(0, 4)) == "list") return missing_file(path, listed_files(path, last));
-  if (data.empty() || data.find('%') != std::string::npos) return {};
-  return missing_file(path, {data});
+  if (data.empty()) return {};
+  if (std::string unnamed = not_named_header(path, ".nhdr"); !unnamed.empty()) return unnamed;
+  if (lower_case(data.substr(0, 4)) == "list") return missing_file(path, listed_files(path, last), false);
+  return missing_file(path, {data}, data.find('%') != std::string::npos);
 }
 
 /// data_bytes: of what follows the header.
@@ -160,9 +176,9 @@ std::string unread_meta_image(const fs::path& path, const HeaderFields& fields, 
         "export it again",
         shown(said), data_bytes);
   }
-  if (lower_case(data.substr(0, 4)) == "list") return missing_file(path, listed_files(path, "elementdatafile"));
-  if (data.find('%') != std::string::npos) return {};
-  return missing_file(path, {data});
+  if (std::string unnamed = not_named_header(path, ".mhd"); !unnamed.empty()) return unnamed;
+  if (lower_case(data.substr(0, 4)) == "list") return missing_file(path, listed_files(path, "elementdatafile"), false);
+  return missing_file(path, {data}, data.find('%') != std::string::npos);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <itkVTKPolyDataMeshIO.h>
 
+#include <assimp/DefaultIOSystem.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <algorithm>
@@ -8,9 +9,13 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
 
-#include "host/confine/confinement.hpp"
-#include "host/confine/isolated.hpp"
+#include "calibration/base/lower_case.hpp"
+#include "host/confine/run_confined_to.hpp"
 #include "host/registration/rigid/surface.hpp"
 
 namespace birdseye::host {
@@ -54,8 +59,35 @@ Surface decode_vtk(const fs::path& path) {
   return surface;
 }
 
-Surface decode_others(const fs::path& path) {
+/// Opens the surface's own file alone. Another one that is there and is asked for may hold some of its triangles,
+/// unless it is a material.
+class OwnFile : public Assimp::DefaultIOSystem {
+ public:
+  OwnFile(fs::path own, std::string* asked_for) : own_(std::move(own)), asked_for_(asked_for) {}
+  using Assimp::DefaultIOSystem::Exists;
+  using Assimp::DefaultIOSystem::Open;
+  bool Exists(const char* file) const override { return is_own(file) && Assimp::DefaultIOSystem::Exists(file); }
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    return is_own(file) ? Assimp::DefaultIOSystem::Open(file, mode) : nullptr;
+  }
+
+ private:
+  bool is_own(const fs::path& file) const {
+    std::error_code ignored;
+    if (file == own_ || fs::equivalent(file, own_, ignored)) return true;
+    if (lower_case(own_.extension().string()) != ".obj" && fs::is_regular_file(file, ignored))
+      *asked_for_ = file.filename().string();
+    return false;
+  }
+
+  fs::path own_;
+  std::string* asked_for_;
+};
+
+/// beside: a file that holds some of it; empty: none.
+Surface decode_others(const fs::path& path, std::string& beside) {
   Assimp::Importer importer;
+  importer.SetIOHandler(new OwnFile(path, &beside));  // and owns it from here
   const aiScene* scene =
       importer.ReadFile(path.string(), aiProcess_Triangulate | aiProcess_JoinIdenticalVertices | aiProcess_SortByPType);
   Surface surface;
@@ -104,10 +136,12 @@ Result<Surface> read_surface(const fs::path& path) {
         fmt::format("{}: is cut short in its header, which has no end_header; export it again", path.string())};
   constexpr Duration kLongest = Duration::from_ms(60'000);
   Surface surface;
-  const auto ran = run_isolated(
-      [&path](const Send& send) {
-        confine_to(path);
-        const Surface decoded = path.extension() == ".vtk" ? decode_vtk(path) : decode_others(path);
+  std::string beside;
+  const auto ran = run_confined_to(
+      path, {},
+      [&path](const Send& send, std::vector<ProcessCopy>&) {
+        std::string asked_for;
+        const Surface decoded = path.extension() == ".vtk" ? decode_vtk(path) : decode_others(path, asked_for);
         const auto put = [&send](const auto& values) {
           const std::uint64_t count = values.size();
           send(&count, sizeof count);
@@ -115,10 +149,13 @@ Result<Surface> read_surface(const fs::path& path) {
         };
         put(decoded.vertices_mm);
         put(decoded.triangles);
+        put(asked_for);
       },
-      [&surface](const Receive& receive) {
+      [&surface, &beside](const Receive& receive) {
         surface.vertices_mm = taken<Eigen::Vector3f>(receive);
         surface.triangles = taken<std::array<std::uint32_t, 3>>(receive);
+        const auto name = taken<char>(receive);
+        beside.assign(name.begin(), name.end());
       },
       kLongest);
   if (!ran && ran.error().code == Errc::io) return ran.error().with_context(path.string());
@@ -127,6 +164,15 @@ Result<Surface> read_surface(const fs::path& path) {
                  fmt::format("{}: its decoder {} after {:.0f} s; export it again, with fewer triangles, to a disk of "
                              "this machine",
                              path.string(), ran.error().what, kLongest.seconds())};
+  }
+  if (!ran && ran.error().code == Errc::unsupported) {
+    return Error{Errc::unsupported, fmt::format("{}: its decoder {}; export it again, with fewer triangles",
+                                                path.string(), ran.error().what)};
+  }
+  if (ran && !beside.empty()) {
+    return Error{Errc::unsupported, fmt::format("{}: is not whole without another file, {}; export it as one file: "
+                                                "PLY, STL, OBJ or VTK polygons",
+                                                path.string(), beside.substr(0, 255))};
   }
   const bool sound = ran && !surface.triangles.empty() &&
                      std::all_of(surface.vertices_mm.begin(), surface.vertices_mm.end(),

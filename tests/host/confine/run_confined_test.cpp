@@ -6,6 +6,7 @@
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/sysmacros.h>
 #include <unistd.h>
 
@@ -15,6 +16,9 @@
 #include <string>
 #include <thread>
 #include <vector>
+
+#include "host/confine/isolated.hpp"
+#include "tests/support/refused_calls.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -103,6 +107,7 @@ TEST(RunConfined, HasTheMemoryAndTheTimeThatItsInputJustifies) {
   EXPECT_FALSE(run_confined(greedy, "ab", 100));
   const auto late = run_confined(busy, "ab", 100);
   ASSERT_FALSE(late);
+  EXPECT_THAT(late.error().what, HasSubstr("its decoder took longer than a file of its size justifies"));
   EXPECT_THAT(late.error().what, HasSubstr("ended by signal 24"));
 }
 
@@ -117,6 +122,22 @@ TEST(RunConfined, HasThreadsAndNoCopiesAndNothingToRead) {
   EXPECT_EQ(run_confined(has_nothing_to_read, "", 100).value(), "y");
   if (!kernel_has_filters()) GTEST_SKIP() << "this kernel has no seccomp filters";
   EXPECT_EQ(run_confined(copied, "", 100).value(), "n");
+}
+
+TEST(RunConfined, DoesNothingWhereTheSystemSetsNoFilter) {
+  if (!kernel_has_filters()) GTEST_SKIP() << "this kernel has no seccomp filters";
+  std::string came(500, ' ');
+  const auto ran = run_isolated(
+      [&](const Send& send) {
+        if (!testing::refuse_calls({{SYS_seccomp}, {SYS_prctl, 0, PR_SET_SECCOMP}}, EINVAL)) return;
+        const auto made = run_confined(doubled, "ab", 100);
+        std::string said = made ? *made : made.error().what;
+        said.resize(came.size(), ' ');
+        send(said.data(), said.size());
+      },
+      [&](const Receive& receive) { (void)receive(came.data(), came.size()); }, Duration::from_ms(60'000));
+  ASSERT_TRUE(ran) << ran.error().what;
+  EXPECT_THAT(came, HasSubstr("its decoder cannot be confined: there is no filter of its system calls, seccomp"));
 }
 
 TEST(RunConfined, WhatStandsByIsMadeAnewWhereSomethingEndsIt) {

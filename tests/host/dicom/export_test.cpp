@@ -68,8 +68,10 @@ TEST(DicomExport, DirectoriesOfAnyNameAndFilesOfNoImageArePassedOver) {
   for (const std::string& note : told->notes) notes += note + "\n";
   for (const char* what : {"BasicTextSR", "GrayscaleSoftcopyPresentationState", "EncapsulatedPDF"})
     EXPECT_NE(notes.find(what), std::string::npos) << notes;
-  // A directory file stands for its folder.
-  expect_ct(folder / "INDEX001", 4, 0);
+  // A directory file stands for its folder, by its name: what it holds must not open a folder to its decoder.
+  testing::write_directory_file(folder / "DICOMDIR");
+  expect_ct(folder / "DICOMDIR", 4, 0);
+  expect_error(folder / "INDEX001", "not named DICOMDIR; give the folder");
 }
 
 TEST(DicomExport, HoldsNothingButADirectoryOrReports) {

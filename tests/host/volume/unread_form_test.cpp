@@ -74,6 +74,10 @@ std::string nifti(std::int16_t datatype, std::int16_t bits, const char* magic = 
 TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
   const Scratch scratch;
   std::ofstream(scratch / "there.raw") << kVoxels;
+  std::filesystem::create_directory(scratch / "below");
+  std::ofstream(scratch / "below/there.raw") << kVoxels;
+  std::ofstream(scratch / "pair.img") << kVoxels;
+  std::ofstream(scratch / "zipped.img.gz") << gzip(kVoxels);
   struct Case {
     std::string name, text, why;  // why it is refused; empty: it is read
   };
@@ -116,6 +120,11 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
             "more than three dimensions"},
            {"lone.nhdr", nrrd() + "data file: gone.raw\n\n", "\"gone.raw\" is not there"},
            {"list.nhdr", nrrd() + "data file: LIST\nthere.raw\ngone.raw\n", "\"gone.raw\" is not there"},
+           {"dotted.nhdr", nrrd() + "data file: ./there.raw\n\n", ""},
+           {"below.nhdr", nrrd() + "data file: below/there.raw\n\n", "in another folder (\"below/there.raw\")"},
+           {"above.nhdr", nrrd() + "data file: LIST\n../there.raw\n", "in another folder (\"../there.raw\")"},
+           {"many.nhdr", nrrd() + "data file: below/%d.raw 0 1 1\n\n", "in another folder (\"below/%d.raw 0 1 1\")"},
+           {"detached.nrrd", nrrd() + "data file: there.raw\n\n", "name it .nhdr, or save it as one file"},
            {"cut.nrrd", nrrd() + "\nshort", "cut short or damaged"},
            {"good.mha", meta_image() + kVoxels, ""},
            {"more.mha", with(meta_image(), "4 3 2", "4 2 2") + kVoxels, "is of 32"},
@@ -135,6 +144,8 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
            {"half.mha", meta_image("MET_HALF") + kVoxels, "the type MET_HALF"},
            {"lone.mhd", meta_image("MET_SHORT", "", "gone.raw"), "\"gone.raw\" is not there"},
            {"list.mhd", meta_image("MET_SHORT", "", "LIST") + "there.raw\ngone.raw\n", "\"gone.raw\" is not there"},
+           {"below.mhd", meta_image("MET_SHORT", "", "below/there.raw"), "in another folder (\"below/there.raw\")"},
+           {"detached.mha", meta_image("MET_SHORT", "", "there.raw"), "name it .mhd, or save it as one file"},
            {"unsized.mha", meta_image("MET_SHORT", compressed) + kVoxels, "(CompressedDataSize); save it"},
            {"missized.mha", meta_image("MET_SHORT", compressed + "CompressedDataSize = 9\n") + kVoxels,
             "take 9 bytes (CompressedDataSize), and 48 follow"},
@@ -150,6 +161,9 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
            {"two.nii", nifti(4, 32) + kVoxels, "16 bits by its datatype (4), 32 by its bitpix"},
            {"second.nii", std::string("\x1c\x02\0\0n+2\0", 8) + std::string(600, '\0'), "another version than 1"},
            {"lone.hdr", nifti(4, 16, "ni1"), "the file of its voxels, lone.img"},
+           {"pair.hdr", nifti(4, 16, "ni1").substr(0, 348), ""},
+           {"pair.nii", nifti(4, 16, "ni1"), "name it .hdr, beside its .img"},
+           {"zipped.hdr.gz", gzip(nifti(4, 16, "ni1").substr(0, 348)), ""},
            {"voxels.img", kVoxels, "give the one that ends in .hdr"}}) {
     const auto read = import_volume(fs::path(scratch.file(c.name, c.text)));
     EXPECT_EQ(read.has_value(), c.why.empty()) << c.name << (read ? "" : ": " + read.error().what);

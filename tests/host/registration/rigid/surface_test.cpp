@@ -192,6 +192,29 @@ TEST(SurfaceFile, EveryFormatGivesTheSameTriangles) {
   }
 }
 
+TEST(SurfaceFile, TakesNothingFromOtherFilesAndNamesOneThatItWouldNeed) {
+  const birdseye::testing::Scratch scratch;
+  (void)scratch.file("skin.mtl", "newmtl skin\nKd 1 0 0\n");
+  const auto coloured = read_surface(scratch.file(
+      "coloured.obj", "mtllib skin.mtl\nv 0 0 0\nv 10 0 0\nv 10 20 0\nv 0 20 5\nusemtl skin\nf 1 2 3\nf 1 3 4\n"));
+  ASSERT_TRUE(coloured) << coloured.error().what;
+  EXPECT_EQ(coloured->triangles.size(), 2U) << "a material is no part of a surface";
+  const float xyz[9] = {0, 0, 0, 10, 0, 0, 10, 20, 0};
+  (void)scratch.file("corners.bin", std::string(reinterpret_cast<const char*>(xyz), sizeof xyz));
+  const std::string path = scratch.file(
+      "scene.gltf",
+      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],)"
+      R"("buffers":[{"uri":"corners.bin","byteLength":36}],)"
+      R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36}],)"
+      R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[10,20,0]}]})");
+  const auto scene = read_surface(path);
+  ASSERT_FALSE(scene);
+  EXPECT_NE(scene.error().what.find("is not whole without another file, corners.bin; export it as one file"),
+            std::string::npos)
+      << scene.error().what;
+}
+
 TEST(SurfaceFile, RefusesWhatIsNoSurfaceInOneLine) {
   const birdseye::testing::Scratch scratch;
   const auto expect = [](const std::string& path, const char* words) {
