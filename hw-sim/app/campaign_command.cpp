@@ -33,11 +33,13 @@ Result<void> parse_seeds(const std::string& text, SeedRun& settings) {
   const std::size_t colon = all.find(':');
   const std::string_view first = all.substr(0, colon);
   const std::string_view last = colon == std::string_view::npos ? first : all.substr(colon + 1);
-  constexpr std::uint64_t kMost = 1'000'000'000;
+  constexpr std::uint64_t kMost = 1'000'000'000, kMostAtOnce = 10'000'000;  // which are held in a list
   if (number(first, settings.first_seed) && number(last, settings.last_seed) &&
-      settings.first_seed <= settings.last_seed && settings.last_seed <= kMost)
+      settings.first_seed <= settings.last_seed && settings.last_seed <= kMost &&
+      settings.last_seed - settings.first_seed < kMostAtOnce)
     return {};
-  return Error{Errc::bad_value, "--seeds " + text + ": give FIRST:LAST, as 1:2000, up to 1000000000"};
+  return Error{Errc::bad_value,
+               "--seeds " + text + ": give FIRST:LAST, as 1:2000, up to 1000000000 and 10000000 of them"};
 }
 
 void print(const SeedRun& settings, const StudiedOperations& operations, const OperationResult& sum) {

@@ -100,6 +100,16 @@ TEST(Programs, APipeInPlaceOfAFileIsRefusedAndNotWaitedFor) {
     expect_refused("birdseye-sim", arguments, {pipe + ": is no file but a pipe"});
 }
 
+TEST(Programs, WhatIsNoNumberIsNoLengthOfAnOperation) {
+  const Scratch scratch;
+  const std::string out = (scratch / "none").string();
+  expect_refused("birdseye-sim", "operation --minutes nan", {"--minutes: nan is no number"});
+  for (const std::string option : {"--minutes", "--at-most"})
+    expect_refused("birdseye-sim", "campaign --seeds 1:2 --out " + out + " " + option + " nan",
+                   {option + ": nan is no number"}, out);
+  expect_refused("birdseye-sim", "campaign --seeds 1:1000000000 --out " + out, {"10000000 of them"}, out);
+}
+
 TEST(Programs, WrongOptionsAreNamed) {
   const Scratch scratch;
   const std::string tty = "--tty " + (scratch / "tty").string();
