@@ -33,9 +33,12 @@ std::int64_t padded_pixels(std::int64_t width_px, std::int64_t height_px) {
 
 /// By itself ffmpeg goes by what a file holds: a list of other files and addresses, or any of 500 codecs. Two threads
 /// decode faster than a film is played; with one for each processor, the memory that it needs would hang on the
-/// machine. Each picture is given as a PPM, which tells its size.
+/// machine. So it would with OpenBLAS, which ffmpeg loads where it is installed, and which tries for ever to get more.
+/// Each picture is given as a PPM, which tells its size.
 std::vector<std::string> decoder_command(const std::filesystem::path& film, std::int64_t most_px) {
-  return {"ffmpeg",
+  return {"env",
+          "OPENBLAS_NUM_THREADS=1",
+          "ffmpeg",
           "-hide_banner",
           "-loglevel",
           "error",
@@ -171,6 +174,9 @@ Result<bool> FilmReader::take_head() {
   const Deadline deadline = Deadline::after(kDecoderPatience);
   const auto got = decoder_.read(head.data(), head.size(), deadline);
   if (!got) return got.error().with_context(path_.string());
+  constexpr int kNotThere = 127;  // as env ends where it finds no such program
+  if (*got < head.size() && next_ == 0 && decoder_.wait(deadline) == kNotThere)
+    return Error{Errc::not_found, "ffmpeg: cannot be started; is it installed?"};
   if (*got < head.size() && next_ == 0) {
     return Error{Errc::unreadable, fmt::format("{}: ffmpeg finds no picture in it: it is no H.264 film in an MP4 file, "
                                                "or damaged at its beginning; take a copy of the recording that is as "

@@ -1,6 +1,7 @@
 #include "host/files/film.hpp"
 
 #include <gtest/gtest.h>
+#include <stdlib.h>
 
 #include <fstream>
 
@@ -97,6 +98,22 @@ TEST(Film, WhatIsNoFilmIsNotTakenForOneByItsContent) {
   ASSERT_TRUE(ffmpeg) << ffmpeg.error().what;
   ASSERT_EQ(ffmpeg->wait(Deadline::after(Duration::from_ms(60'000))), 0);
   expect_refused_film(other, 64, 48, {none});
+}
+
+TEST(Film, WhereThereIsNoFfmpegThatIsSaid) {
+  const Scratch scratch;
+  const fs::path film = film_of(scratch / "film.mp4", 64, 48, 2);
+  fs::create_directory(scratch / "programs");
+  fs::create_symlink("/usr/bin/env", scratch / "programs/env");
+  const std::string before = ::getenv("PATH");
+  ::setenv("PATH", (scratch / "programs").c_str(), 1);
+  auto reader = FilmReader::open(film, 64, 48);
+  ::setenv("PATH", before.c_str(), 1);
+  ASSERT_TRUE(reader) << reader.error().what;
+  const auto frame = reader->read(0);
+  ASSERT_FALSE(frame);
+  EXPECT_EQ(frame.error().code, Errc::not_found);
+  EXPECT_NE(frame.error().what.find("ffmpeg: cannot be started"), std::string::npos) << frame.error().what;
 }
 
 }  // namespace
