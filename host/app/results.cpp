@@ -80,10 +80,11 @@ void allow_unsigned_sources(CLI::App& command) {
 Result<AdmittedRecording> admit_sources(const std::vector<std::filesystem::path>& sources, const ResultPaths& paths) {
   AdmittedRecording out;
   for (const auto& source : sources) {
-    if (source.empty()) continue;
+    const auto recording = recording_at(source);
+    if (source.empty() || !recording) continue;
     const auto authors = Authors::of_this_machine(paths.accept_unsigned);
     if (!authors) return authors.error();
-    auto admitted = admit_recording(source, *authors);
+    auto admitted = admit_recording(*recording, *authors);
     if (!admitted) return admitted.error();
     if (out.doubt.empty()) out.doubt = std::move(admitted->doubt);
     if (out.events_sha256.empty()) out.events_sha256 = std::move(admitted->events_sha256);

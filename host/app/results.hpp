@@ -30,8 +30,9 @@ void add_result_options(CLI::App& command, ResultPaths& paths, const std::string
 /// --record.
 void allow_unsigned_sources(CLI::App& command);
 
-/// Whose recordings a calibration goes by, by the rule for all recordings: those of these paths that are recordings,
-/// for files of poses may be such, too. The first doubt, and the sum of the first's events. An empty path is nobody's.
+/// Whose recordings a calibration goes by, by the rule for all recordings: those of these paths that are recordings
+/// or files of one, for files of poses may be such, too. The first doubt, and the sum of the first's events. An empty
+/// path is nobody's.
 Result<AdmittedRecording> admit_sources(const std::vector<std::filesystem::path>& sources, const ResultPaths& paths);
 /// Whose map of the field it corrects poses by, likewise, or whose map the appliance at `server` has corrected them by.
 /// map, server: empty where there is none.

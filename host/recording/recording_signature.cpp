@@ -115,6 +115,16 @@ Result<AdmittedRecording> admit_appliance_recording(const fs::path& path, const 
 
 }  // namespace
 
+std::optional<fs::path> recording_at(const fs::path& path) {
+  if (is_appliance_recording(path)) return path;
+  std::error_code ignored;
+  const fs::path folder = fs::is_directory(path, ignored) ? path
+                          : path.has_parent_path()        ? path.parent_path()
+                                                          : fs::path(".");
+  const bool is_one = fs::exists(folder / kRecordingSheet, ignored) || fs::exists(folder / kRecordingEvents, ignored);
+  return is_one ? std::optional(folder) : std::nullopt;
+}
+
 Result<AdmittedRecording> admit_recording(const fs::path& path, const Authors& authors) {
   if (is_appliance_recording(path)) return admit_appliance_recording(path, authors);
   std::error_code ignored;

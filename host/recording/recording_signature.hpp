@@ -29,6 +29,10 @@ struct RecordingSeal {
 /// Reads all of the recording's files: as long as the disk takes.
 Result<RecordingSeal> read_recording_seal(const std::filesystem::path& folder);
 
+/// The recording that a path is, or that the file at it belongs to: its poses are the recording's. Empty: there is
+/// none.
+std::optional<std::filesystem::path> recording_at(const std::filesystem::path& path);
+
 struct AdmittedRecording {
   std::string doubt;          ///< that its author, or that of what its poses rest on, is not known; empty: all are
   std::string events_sha256;  ///< that its reader compares the events with; empty: nobody signed

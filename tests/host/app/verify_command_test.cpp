@@ -160,16 +160,29 @@ TEST(VerifyCommand, ACalibrationTakesNoPosesOfARecordingThatItWouldRefuse) {
   const std::string other = scratch.file("other.csv", "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n");
   for (const std::string name : {"changed", "nobodys"}) {
     const std::string folder = (scratch / name).string();
+    const std::string file = folder + "/tracker.igs.mha";  // of the recording, whoever names it
     for (const std::string& command :
-         {"tip --poses " + folder, "tip --poses " + other + " --spin " + folder,
-          "latency --poses " + folder + " --eye-poses " + other, "latency --poses " + other + " --eye-poses " + folder,
-          "hand-eye --poses " + folder + " --eye-poses " + other,
+         {"tip --poses " + folder, "tip --poses " + file, "latency --poses " + other + " --eye-poses " + file,
+          "tip --poses " + other + " --spin " + folder, "latency --poses " + folder + " --eye-poses " + other,
+          "latency --poses " + other + " --eye-poses " + folder, "hand-eye --poses " + folder + " --eye-poses " + other,
           "hand-eye --poses " + other + " --eye-poses " + folder, "field --pair " + other + " " + folder,
           "field --grid-spec 2x2x2:100x100x100mm --poses " + folder}) {
       testing::expect_refused("birdseye", "calibrate " + command,
                               {name, name == "changed" ? "since the recording was signed: tracker.igs.mha"
                                                        : "is not signed: nobody says who wrote it"});
     }
+  }
+}
+
+/// Nothing of them is signed, and nothing has to be judged.
+TEST(VerifyCommand, ACalibrationFromFilesOfPosesNeedsNoKey) {
+  const Scratch scratch;
+  const std::string a = scratch.file("a.csv", "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n");
+  const std::string b = scratch.file("b.csv", "t,x,y,z,qx,qy,qz,qw\n0,1,0,0,0,0,0,1\n");
+  const std::string without = "env BIRDSEYE_IDENTITY=/proc/none";
+  for (const std::string command : {"latency --poses ", "hand-eye --poses "}) {
+    const auto result = testing::run("birdseye", "calibrate " + command + a + " --eye-poses " + b, without);
+    EXPECT_EQ(result.output.find("/proc/none"), std::string::npos) << result.output;
   }
 }
 
