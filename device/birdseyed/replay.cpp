@@ -79,7 +79,7 @@ Result<void> replay(const std::filesystem::path& recording, const std::string& s
   if (reader->cut_short()) spdlog::warn("{}: ends inside a block, as after a power cut", recording.string());
   if (reader->sha256() == sha256) return {};
   return Error{Errc::bad_format,
-               fmt::format("{}: was changed while it was played: what was shown is not what was "
+               fmt::format("{}: was changed, or still written, while it was played: what was shown is not what was "
                            "admitted; take a copy that is as it was written, where only you can write",
                            recording.string())};
 }
