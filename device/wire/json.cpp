@@ -1,6 +1,7 @@
 #include "device/wire/json.hpp"
 
 #include <nlohmann/json.hpp>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -9,6 +10,16 @@
 namespace birdseye::wire {
 
 using nlohmann::json;
+
+template <typename Whole>
+void get_whole(const json& in, Whole& out) {
+  if (!in.is_number_integer()) throw json::type_error::create(302, "a whole number is wanted", &in);
+  out = in.get<Whole>();
+}
+
+template void get_whole(const json& in, int& out);
+template void get_whole(const json& in, std::int64_t& out);
+template void get_whole(const json& in, std::uint64_t& out);
 
 namespace {
 
@@ -56,6 +67,16 @@ void each_of_health(AnyHealth& health, const Each& each) {
   each("field_unsigned", health.field_unsigned);
 }
 
+/// Leaves what is not told as it is.
+template <typename Value>
+void get_where_told(const json& in, const char* key, Value& value) {
+  if constexpr (std::is_integral_v<Value> && !std::is_same_v<Value, bool>) {
+    if (in.contains(key)) get_whole(in.at(key), value);
+  } else {
+    value = in.value(key, value);
+  }
+}
+
 }  // namespace
 
 std::string text_of(const json& value) {
@@ -88,19 +109,19 @@ void to_json(json& out, const FrameInfo& info) {
 }
 
 void from_json(const json& in, FrameInfo& info) {
-  in.at("sequence").get_to(info.sequence);
-  in.at("acquired_ns").get_to(info.acquired.ns);
-  in.at("acquired_sigma_ns").get_to(info.acquired_sigma.ns);
-  in.at("arrived_ns").get_to(info.arrived.ns);
-  in.at("frames_dropped").get_to(info.frames_dropped);
-  if (in.contains("latency_ns")) info.latency.emplace().ns = in.at("latency_ns").get<std::int64_t>();
+  get_whole(in.at("sequence"), info.sequence);
+  get_whole(in.at("acquired_ns"), info.acquired.ns);
+  get_whole(in.at("acquired_sigma_ns"), info.acquired_sigma.ns);
+  get_whole(in.at("arrived_ns"), info.arrived.ns);
+  get_whole(in.at("frames_dropped"), info.frames_dropped);
+  if (in.contains("latency_ns")) get_whole(in.at("latency_ns"), info.latency.emplace().ns);
   const json& pose = in.at("pose");
   const auto kind = pose.at("kind").get<std::string>();
   pose.at("reason").get_to(info.pose.reason);
   pose.at("sigma_mm").get_to(info.pose.position_sigma_mm);
-  pose.at("time_sigma_ns").get_to(info.pose.time_sigma.ns);
+  get_whole(pose.at("time_sigma_ns"), info.pose.time_sigma.ns);
   pose.at("speed_mm_s").get_to(info.pose.speed_mm_s);
-  pose.at("age_ns").get_to(info.pose.age.ns);
+  get_whole(pose.at("age_ns"), info.pose.age.ns);
   const json& matrix = pose.at("tracker_from_scope");
   for (const PoseKind known : {PoseKind::exact, PoseKind::interpolated, PoseKind::predicted}) {
     if (kind != to_string(known) || matrix.size() != 16) continue;
@@ -117,7 +138,7 @@ void to_json(json& out, const Doubt& doubt) {
   out = {{"acquired_ns", doubt.acquired.ns}, {"bird", doubt.bird}, {"why", doubt.why}};
 }
 void from_json(const json& in, Doubt& doubt) {
-  in.at("acquired_ns").get_to(doubt.acquired.ns);
+  get_whole(in.at("acquired_ns"), doubt.acquired.ns);
   in.at("bird").get_to(doubt.bird);
   in.at("why").get_to(doubt.why);
 }
@@ -130,10 +151,10 @@ void to_json(json& out, const ClockChange& change) {
          {"by_ppm", change.by_ppm}};
 }
 void from_json(const json& in, ClockChange& change) {
-  in.at("at_ns").get_to(change.at.ns);
+  get_whole(in.at("at_ns"), change.at.ns);
   in.at("clock").get_to(change.clock);
   in.at("kind").get_to(change.kind);
-  in.at("by_ns").get_to(change.by.ns);
+  get_whole(in.at("by_ns"), change.by.ns);
   in.at("by_ppm").get_to(change.by_ppm);
 }
 
@@ -142,14 +163,14 @@ void to_json(json& out, const Pedal& pedal) {
 }
 void from_json(const json& in, Pedal& pedal) {
   in.at("pressed").get_to(pedal.pressed);
-  in.at("at_ns").get_to(pedal.at.ns);
+  get_whole(in.at("at_ns"), pedal.at.ns);
 }
 
 void to_json(json& out, const ClockPing& ping) {
   out = {{"host_sent_ns", ping.host_sent_ns}};
 }
 void from_json(const json& in, ClockPing& ping) {
-  in.at("host_sent_ns").get_to(ping.host_sent_ns);
+  get_whole(in.at("host_sent_ns"), ping.host_sent_ns);
 }
 
 void to_json(json& out, const ClockPong& pong) {
@@ -157,9 +178,9 @@ void to_json(json& out, const ClockPong& pong) {
       {"host_sent_ns", pong.host_sent_ns}, {"device_received_ns", pong.received.ns}, {"device_sent_ns", pong.sent.ns}};
 }
 void from_json(const json& in, ClockPong& pong) {
-  in.at("host_sent_ns").get_to(pong.host_sent_ns);
-  in.at("device_received_ns").get_to(pong.received.ns);
-  in.at("device_sent_ns").get_to(pong.sent.ns);
+  get_whole(in.at("host_sent_ns"), pong.host_sent_ns);
+  get_whole(in.at("device_received_ns"), pong.received.ns);
+  get_whole(in.at("device_sent_ns"), pong.sent.ns);
 }
 
 void to_json(json& out, const Subscription& subscription) {
@@ -208,9 +229,9 @@ void from_json(const json& in, WallClock& clock) {
   in.at("known").get_to(clock.known);
   in.at("synchronised").get_to(clock.synchronised);
   in.at("tai_known").get_to(clock.tai_known);
-  in.at("max_error_ns").get_to(clock.max_error_ns);
-  in.at("est_error_ns").get_to(clock.est_error_ns);
-  in.at("wall_minus_monotonic_ns").get_to(clock.wall_minus_monotonic_ns);
+  get_whole(in.at("max_error_ns"), clock.max_error_ns);
+  get_whole(in.at("est_error_ns"), clock.est_error_ns);
+  get_whole(in.at("wall_minus_monotonic_ns"), clock.wall_minus_monotonic_ns);
   in.at("source").get_to(clock.source);
 }
 
@@ -219,7 +240,7 @@ void to_json(json& out, const InstrumentHealth& instrument) {
 }
 void from_json(const json& in, InstrumentHealth& instrument) {
   instrument = InstrumentHealth();
-  each_of_instrument(instrument, [&](const char* key, auto& value) { value = in.value(key, value); });
+  each_of_instrument(instrument, [&](const char* key, auto& value) { get_where_told(in, key, value); });
 }
 
 void to_json(json& out, const Health& health) {
@@ -227,7 +248,7 @@ void to_json(json& out, const Health& health) {
 }
 void from_json(const json& in, Health& health) {
   health = Health();
-  each_of_health(health, [&](const char* key, auto& value) { value = in.value(key, value); });
+  each_of_health(health, [&](const char* key, auto& value) { get_where_told(in, key, value); });
 }
 
 }  // namespace birdseye::wire

@@ -12,6 +12,11 @@ namespace birdseye::wire {
 /// become U+FFFD.
 std::string text_of(const nlohmann::json& json);
 
+/// A whole number. Throws where the value is none: one with a fraction or an exponent may be larger than any, and what
+/// it is turned into is then undefined. Of int, int64_t and uint64_t.
+template <typename Whole>
+void get_whole(const nlohmann::json& in, Whole& out);
+
 void to_json(nlohmann::json& json, const FrameInfo& info);
 void from_json(const nlohmann::json& json, FrameInfo& info);
 void to_json(nlohmann::json& json, const ClockChange& change);

@@ -28,7 +28,7 @@ json json_of(const wire::Birds& birds) {
 /// Throws json::exception, or std::invalid_argument for a matrix that is no pose.
 wire::Birds birds_of(const json& in) {
   wire::Birds birds;
-  in.at("acquired_ns").get_to(birds.acquired.ns);
+  wire::get_whole(in.at("acquired_ns"), birds.acquired.ns);
   for (const json& bird : in.at("birds")) {
     const json& rows = bird.at("tracker_from_sensor");
     if (rows.size() != 16) throw std::invalid_argument("a pose has 16 numbers");
@@ -52,9 +52,11 @@ EventOfLine event_of(const std::string& kind, const json& in) {
   if (kind == "VideoFrame") {
     wire::VideoFrame frame;
     in.at("info").get_to(frame.info);
-    in.at("width_px").get_to(frame.width_px);
-    in.at("height_px").get_to(frame.height_px);
-    return {frame, {in.at("file").get<std::string>(), in.at("index").get<std::size_t>()}};
+    wire::get_whole(in.at("width_px"), frame.width_px);
+    wire::get_whole(in.at("height_px"), frame.height_px);
+    std::size_t index = 0;
+    wire::get_whole(in.at("index"), index);
+    return {frame, {in.at("file").get<std::string>(), index}};
   }
   if (kind == "Birds") return {birds_of(in), {}};
   if (kind == "Doubt") return {in.get<wire::Doubt>(), {}};

@@ -6,6 +6,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "host/files/film.hpp"
+#include "host/recording/event_lines.hpp"
 #include "host/recording/recording_reader.hpp"
 #include "host/recording/recording_writer.hpp"
 #include "host/recording/sequence_writer.hpp"
@@ -395,6 +396,15 @@ TEST(Recording, DamageIsNamed) {
   expect({"holds no recording"});
   EXPECT_EQ(play(scratch / "none").ending.code, Errc::not_found);
   EXPECT_EQ(RecordingWriter::create({.folder = scratch / "r", .source = ""}).error().code, Errc::in_use);
+}
+
+/// What such a number is turned into is undefined.
+TEST(Recording, ATimeThatIsNoWholeNumberIsDamage) {
+  EXPECT_TRUE(parse_event_line(R"({"Doubt":{"acquired_ns":12,"bird":"scope","why":""}})"));
+  for (const std::string time : {"1.5", "1e67", "1e2", "true", "99999999999999999999"}) {
+    const auto read = parse_event_line(R"({"Doubt":{"acquired_ns":)" + time + R"(,"bird":"scope","why":""}})");
+    EXPECT_FALSE(read) << time;
+  }
 }
 
 TEST(Recording, AtItsPaceAnEventWaitsForItsTime) {
