@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kDeepest = 64;
 
-/// A text's place, and what is asked of it.
+/// A place in a text.
 struct Reader {
   std::string_view text;
   std::size_t at = 0;
@@ -31,7 +31,7 @@ void pass_over_lines(Reader& reader, std::string_view quotes, bool escapes) {
   }
 }
 
-/// Goes behind a string of one line. A line's end ends it in any case: there the parser gives up.
+/// Goes behind a string of one line. The line's end ends the string too: there the parser gives up.
 void pass_over_string(Reader& reader, char quote, bool escapes) {
   for (++reader.at; !reader.ended() && reader.text[reader.at] != '\n'; ++reader.at) {
     if (reader.text[reader.at] == quote) {
@@ -42,8 +42,8 @@ void pass_over_string(Reader& reader, char quote, bool escapes) {
   }
 }
 
-/// The text without what opens no level, whatever stands in it: an s for each string, nothing for a comment. As long as
-/// the parser finds no fault it takes the same for strings and comments; it stops at the first.
+/// The text with an s in place of each string, and without comments: brackets in strings and comments open no level.
+/// Until the parser's first fault, at which it stops, the parser takes the same for strings and comments.
 std::string without_strings(std::string_view text, Notation notation) {
   std::string out;
   out.reserve(text.size());

@@ -56,8 +56,7 @@ void say_that_files_are_open() {
   if (said.test_and_set()) return;
   std::fputs(
       "birdseye: note: this kernel has no Landlock, so the decoder of a damaged file could read what this user can; "
-      "run "
-      "a kernel that has it, as Debian's, or read files you trust only\n",
+      "run a kernel with Landlock, as Debian's, or read only files that you trust\n",
       stderr);
 }
 

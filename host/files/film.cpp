@@ -174,10 +174,10 @@ Result<bool> FilmReader::take_head() {
   const Deadline deadline = Deadline::after(kDecoderPatience);
   const auto got = decoder_.read(head.data(), head.size(), deadline);
   if (!got) return got.error().with_context(path_.string());
-  constexpr int kNotThere = 127;  // as env ends where it finds no such program
-  if (*got < head.size() && next_ == 0 && decoder_.wait(deadline) == kNotThere)
-    return Error{Errc::not_found, "ffmpeg: cannot be started; is it installed?"};
   if (*got < head.size() && next_ == 0) {
+    constexpr int kNotThere = 127;  // env's exit code where it finds no such program
+    if (decoder_.wait(deadline) == kNotThere)
+      return Error{Errc::not_found, "ffmpeg: cannot be started; is it installed?"};
     return Error{Errc::unreadable, fmt::format("{}: ffmpeg finds no picture in it: it is no H.264 film in an MP4 file, "
                                                "or damaged at its beginning; take a copy of the recording that is as "
                                                "it was written",

@@ -9,6 +9,7 @@
 #include <set>
 #include <system_error>
 
+#include "calibration/record/strict_json.hpp"
 #include "drivers/system/durable.hpp"
 #include "drivers/system/unique_fd.hpp"
 
@@ -99,8 +100,7 @@ Result<void> write_file(const fs::path& path, const std::string& text) {
 }
 
 std::string text_of(const nlohmann::json& json) {
-  // Names may come from files in other encodings: what is found is not lost for one of them.
-  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return calibration::text_of_json(json, 2) + "\n";
 }
 
 }  // namespace birdseye::host

@@ -23,8 +23,8 @@ constexpr double kTurned_rad = 15 * M_PI / 180;
 constexpr double kAhead_mm = 100;      // from the camera to what is told of noise
 constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
 constexpr double kPlainly = 3;         // so many times as far off would be plain
-constexpr double kNearlyOff = 0.75;  // of what is allowed: what is so far off tells neither that it agrees nor that not
-constexpr double kHastePx = 5;       // of the small picture: a key whose poses leave so much open hides what is wrong
+constexpr double kNearlyOff = 0.75;    // of what is allowed: places farther off neither agree nor differ
+constexpr double kHastePx = 5;         // of the small picture: a key whose poses leave so much open hides what is wrong
 constexpr double kFarthestStepPx = 20;  // of the small picture: what moves farther in one frame is not followed safely
 constexpr double kOfHaste = 0.4;        // of the poses' haste, places move so much at least; where poses leap, less
 constexpr int kOddInRow = 4, kMostWanted = 32;
@@ -272,7 +272,7 @@ void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
   const bool hasty = poses_step_px > kFarthestStepPx && waiting.farthest_step_px > kOfHaste * poses_step_px;
   const bool lost = hasty || waiting.then.size() < kFewest;
   const Judged judged = lost ? Judged::not_odd : judge(waiting, *from, scope);
-  // Nor while they are nearly off, for a while: the next pictures tell.
+  // Places that are nearly off are followed for three seconds more: the next pictures tell.
   const bool nearly_off = key_->off > kNearlyOff && waiting.at - key_->at < kLongest + kLongest;
   const bool calmer = !nearly_off && key_->from->unsure_px > std::max(2 * from->unsure_px, kHastePx * small_px);
   // Not while the poses leave much open: what leaps then would lie between two keys.
@@ -392,7 +392,8 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
     if (!std::exchange(key_->told[axis], true)) ++told_[axis];
   }
   if (doubted_since_ && waiting.at < *doubted_since_) return Judged::not_odd;
-  if (state_ == VideoAgreement::in_doubt && key_->off > kNearlyOff) return Judged::not_odd;  // it ends no doubt
+  if (state_ == VideoAgreement::in_doubt && key_->off > kNearlyOff)
+    return Judged::not_odd;  // such a picture ends no doubt
   if (std::ranges::all_of(told_, [this](int times) { return times >= wanted_; })) state_ = VideoAgreement::agrees;
   return Judged::not_odd;
 }

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/geometry/rigid_matrix.hpp"
+#include "calibration/record/strict_json.hpp"
 #include "device/wire/json.hpp"
 #include "drivers/system/json_file.hpp"
 
@@ -84,8 +85,7 @@ std::string event_line(const wire::Event& event, const FramePlace& place) {
     json operator()(const wire::CameraControls& e) const { return {{"CameraControls", e}}; }
     json operator()(const wire::Calibration& e) const { return {{"Calibration", e}}; }
   };
-  // Names that an instrument tells need not be UTF-8.
-  return std::visit(Visitor{place}, event).dump(-1, ' ', false, json::error_handler_t::replace);
+  return calibration::text_of_json(std::visit(Visitor{place}, event));
 }
 
 Result<EventOfLine> parse_event_line(const std::string& line) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "calibration/record/strict_json.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/durable.hpp"
 #include "host/files/frame_size.hpp"
@@ -323,8 +324,7 @@ Result<void> RecordingWriter::write_sheet(const std::string& why, bool ended) {
   if (ended && settings_.machine) {
     if (auto signed_now = sign_recording(settings_.folder, sheet, *settings_.machine); !signed_now) return signed_now;
   }
-  return write_file(settings_.folder / kRecordingSheet,
-                    sheet.dump(2, ' ', false, json::error_handler_t::replace) + "\n");
+  return write_file(settings_.folder / kRecordingSheet, calibration::text_of_json(sheet, 2) + "\n");
 }
 
 }  // namespace birdseye::host

@@ -36,8 +36,9 @@ std::vector<std::string> command_for(const SeedStudy& study, std::uint64_t seed)
   return out;
 }
 
-/// Empty where it ended as a program does that has said all: with 0, or with what says that its verdict is bad. An
-/// error: it was ended from outside, as where memory ran short: nothing is known of the seed.
+/// What is wrong with how a seed's program ended; empty where its exit code is 0, or 3, which says that its verdict is
+/// bad. An error where something else ended the program, as the kernel does where memory runs short: such a seed has no
+/// result, and is tried again.
 Result<std::string> fault_of_end(const std::optional<int>& code) {
   constexpr int kSignal = 128, kBadVerdict = 3;
   if (!code) return std::string("it did not end in time");

@@ -88,7 +88,7 @@ class OperationLaws {
     std::uint64_t faults = 0, faults_judged = 0;
     std::uint64_t moved = 0, moved_unwatched = 0;    ///< how often transmitter or patient were, without a reference
     double slowest_named_s = 0, slowest_over_s = 0;  ///< less what the fault's signs allow
-    std::map<std::string, OfFault> by_fault;         ///< "camera stale"
+    std::map<std::string, OfFault> by_fault;         ///< by target and kind, as "camera unplug"
   };
   [[nodiscard]] const Figures& figures() const { return figures_; }
   [[nodiscard]] const std::vector<BrokenLaw>& broken() const { return broken_; }
@@ -99,7 +99,7 @@ class OperationLaws {
     FaultTarget of;
     FaultSigns signs;
     double begins_s = 0, ends_s = 0;
-    double own_end_s = 0;  ///< before what follows of the fault
+    double own_end_s = 0;  ///< when the fault itself ends; ends_s is when its effects may last until
     bool alone = true;
     std::optional<double> named_s, poses_again_s, frames_again_s;
     std::bitset<3> birds_again{};  ///< those that have had a pose since its end
@@ -157,7 +157,7 @@ class OperationLaws {
   std::vector<Found> kept_;
   bool nothing_kept_ = true;      ///< there is no registration on the disk: none was found, or it was taken back
   bool none_to_take_up_ = false;  ///< this window was opened so, and nothing was touched since
-  bool in_doubt_ = false;         ///< the registration is, or is held back
+  bool in_doubt_ = false;         ///< the registration is in doubt, or held back
   std::optional<double> may_calibrate_since_s_;    ///< all is there for it
   std::optional<std::size_t> checks_when_opened_;  ///< of a window that takes up; empty: one was checked since
   Figures figures_;
