@@ -9,6 +9,7 @@
 #include "device/birdseyed/camera_thread.hpp"
 #include "device/birdseyed/core.hpp"
 #include "device/birdseyed/gpio_thread.hpp"
+#include "device/birdseyed/record_file.hpp"
 #include "drivers/io/open_line.hpp"
 #include "drivers/minibird/settings.hpp"
 #include "drivers/video/frame_source.hpp"
@@ -29,12 +30,6 @@ struct WireConfig {
   int port = 18944;
   bool allow_plain = false;  ///< beyond this machine
   bool operator==(const WireConfig&) const = default;
-};
-
-struct RecordConfig {
-  std::filesystem::path folder;  ///< empty: nothing is recorded
-  bool frames = true;
-  double most_gb = 20;  ///< of one file; then recording ends and the status says so
 };
 
 /// What birdseyed is told by its configuration file (docs/manual/birdseyed.md).

@@ -1,12 +1,9 @@
 #include "device/birdseyed/recorder.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <deque>
 #include <mutex>
 #include <optional>
@@ -14,12 +11,9 @@
 #include <utility>
 
 #include "calibration/record/sha256.hpp"
-#include "drivers/identity/this_machine.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/condition.hpp"
 #include "drivers/system/crash_note.hpp"
-#include "drivers/system/durable.hpp"
-#include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::device {
 
@@ -31,7 +25,6 @@ constexpr std::size_t kSyncBytes = 16'000'000;  // more at once, and frames over
 constexpr Duration kBeginWithin = Duration::from_ms(1000);
 constexpr Duration kWriteAfterStop = Duration::from_ms(1000);
 constexpr Duration kEndWithin = Duration::from_ms(2000);  // the last write and its sync included
-constexpr int kMostOfOneName = 1000;
 
 std::string words(int os_errno) {
   return std::generic_category().message(os_errno);
@@ -45,60 +38,13 @@ std::size_t size_of(const RawEvent& event) {
   return bytes;
 }
 
-class DiskFile : public RecordFile {
- public:
-  DiskFile(UniqueFd fd, const std::filesystem::path& path) : fd_(std::move(fd)), folder_(path.parent_path()) {}
-
-  int write(std::span<const std::uint8_t> bytes) override {
-    while (!bytes.empty()) {
-      const ssize_t put = ::write(fd_.get(), bytes.data(), bytes.size());
-      if (put < 0 && errno == EINTR) continue;
-      if (put <= 0) return put < 0 ? errno : ENOSPC;
-      bytes = bytes.subspan(static_cast<std::size_t>(put));
-    }
-    return 0;
-  }
-  int sync() override {
-    if (::fdatasync(fd_.get()) != 0 && errno != EINVAL) return errno;  // EINVAL: it cannot
-    // Its name with it, once: what is on the disk without a name is lost all the same.
-    if (named_) return 0;
-    if (!sync_folder(folder_)) return EIO;
-    named_ = true;
-    return 0;
-  }
-
- private:
-  UniqueFd fd_;
-  std::filesystem::path folder_;
-  bool named_ = false;
-};
-
 }  // namespace
-
-Result<NewRecordFile> create_record_file(const RecordConfig& config) {
-  std::string stamp = utc_now();
-  std::erase_if(stamp, [](char c) { return c == '-' || c == ':'; });
-  const std::string name = "birdseyed-" + stamp;
-  if (auto made = make_folder_durably(config.folder); !made)
-    return Error{Errc::unreadable, made.error().what + " ([record] folder)"};
-  std::filesystem::path path = config.folder / (name + ".berec");
-  int os_errno = EEXIST;
-  for (int i = 2; os_errno == EEXIST && i <= kMostOfOneName; ++i) {
-    UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640));
-    if (fd) return NewRecordFile{std::make_unique<DiskFile>(std::move(fd), path), path};
-    os_errno = errno;
-    if (os_errno == EEXIST) path = config.folder / fmt::format("{}-{}.berec", name, i);
-  }
-  return Error{Errc::unreadable, fmt::format("{}: cannot be written ({}); see [record] folder and its permissions",
-                                             path.string(), words(os_errno))};
-}
 
 /// What the thread and its recorder share. A thread that hangs keeps it, and nothing else of the program: not even the
 /// registry of loggers.
 class Recorder::Writer {
  public:
-  Writer(RecordConfig config, CoreSettings settings, Create create)
-      : config_(std::move(config)), settings_(std::move(settings)), create_(std::move(create)) {}
+  Writer(RecordConfig config, CoreSettings settings) : config_(std::move(config)), settings_(std::move(settings)) {}
 
   void run();
   /// The file's name, once it is begun.
@@ -119,7 +65,6 @@ class Recorder::Writer {
 
   const RecordConfig config_;
   const CoreSettings settings_;
-  const Create create_;
   const std::shared_ptr<spdlog::logger> log_ = spdlog::default_logger();
 
   // The thread's alone.
@@ -142,16 +87,12 @@ class Recorder::Writer {
 };
 
 Result<std::filesystem::path> Recorder::Writer::begin() {
-  auto created = create_(config_);
+  auto created = config_.create(config_.folder);
   if (!created) return created.error();
   file_ = std::move(created->file);
+  machine_ = std::move(created->machine);
   int failed = put(recording_magic());
   if (failed == 0) failed = put(block_of(settings_));
-  if (auto machine = ThisMachine::open()) {
-    machine_ = *std::move(machine);
-  } else {  // better one that nobody signs than none
-    log_->warn("recording: {}: not signed: {}", created->path.string(), machine.error().what);
-  }
   if (failed == 0) return created->path;
   std::error_code ignored;
   std::filesystem::remove(created->path, ignored);
@@ -299,9 +240,8 @@ bool Recorder::Writer::stop() {
   return told_.wait(lock, Deadline::after(kEndWithin), [this] { return done_; });
 }
 
-Result<std::unique_ptr<Recorder>> Recorder::start(const RecordConfig& config, const CoreSettings& settings,
-                                                  Create create) {
-  std::unique_ptr<Recorder> recorder(new Recorder(std::make_shared<Writer>(config, settings, std::move(create))));
+Result<std::unique_ptr<Recorder>> Recorder::start(const RecordConfig& config, const CoreSettings& settings) {
+  std::unique_ptr<Recorder> recorder(new Recorder(std::make_shared<Writer>(config, settings)));
   auto begun = recorder->writer_->wait_for_begin();
   if (!begun) return begun.error();
   recorder->path_ = *std::move(begun);

@@ -1,34 +1,14 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <memory>
-#include <span>
 #include <string>
 
-#include "device/birdseyed/config.hpp"
+#include "device/birdseyed/record_file.hpp"
 #include "device/birdseyed/recording.hpp"
 #include "drivers/system/thread.hpp"
 
 namespace birdseye::device {
-
-/// The file of an appliance recording. Each call may take as long as the disk takes.
-class RecordFile {
- public:
-  virtual ~RecordFile() = default;
-  /// Writes all bytes: 0, or errno.
-  virtual int write(std::span<const std::uint8_t> bytes) = 0;
-  /// Brings everything written so far onto the disk, so that a power cut does not lose it: 0, or errno.
-  virtual int sync() = 0;
-};
-
-struct NewRecordFile {
-  std::unique_ptr<RecordFile> file;
-  std::filesystem::path path;
-};
-
-/// Creates birdseyed-<UTC date and time>.berec in the folder, with -2, -3 and so on where there is one of that name.
-Result<NewRecordFile> create_record_file(const RecordConfig& config);
 
 /// Writes raw events to a file on a thread of its own. If the disk keeps up, everything that was taken more than a
 /// second ago is on it, so a power cut loses no more than that. A disk that does not keep up, is full, or goes away
@@ -36,14 +16,11 @@ Result<NewRecordFile> create_record_file(const RecordConfig& config);
 /// hangs in a disk is abandoned.
 class Recorder {
  public:
-  using Create = std::function<Result<NewRecordFile>(const RecordConfig&)>;
-
   /// The most that may wait for the disk, including what is being written: 64 MB, or two frames where these are larger.
   static constexpr std::size_t kMostHeldBytes = 64'000'000;
 
   /// An error where no file could be begun within a second.
-  static Result<std::unique_ptr<Recorder>> start(const RecordConfig& config, const CoreSettings& settings,
-                                                 Create create = create_record_file);
+  static Result<std::unique_ptr<Recorder>> start(const RecordConfig& config, const CoreSettings& settings);
   /// Writes what waits, for a second at most.
   ~Recorder();
   Recorder(const Recorder&) = delete;

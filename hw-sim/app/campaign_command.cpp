@@ -59,6 +59,8 @@ void print(const SeedRun& settings, const StudiedOperations& operations, const O
       "overlay whole on {:.1f} % of pictures, {:.4f} % of those beyond 1.5 circles, worst {:.2f}; oldest {:.0f} ms\n",
       share(sum.green, sum.shown), share(sum.beyond, sum.judged), sum.worst_circles, sum.worst_age_ms);
   fmt::print("worst pose {:.2f} of what it may be off; {}\n", sum.worst_pose, words_of_faults(sum));
+  fmt::print("{} recordings of the appliance, with {} events that had reached the window\n", sum.recordings,
+             sum.found_again);
   fmt::print("{}\n", words_of_laws(sum));
   if (sum.laws_broken > 0) {
     fmt::print("birdseye-sim operation --seed SEED --minutes {}{} --shortest prints the fewest faults that break one\n",

@@ -55,6 +55,8 @@ OperationResult result_of(const SimulatedOperation& operation, const OperationOu
   result.checks = out.checks;
   result.moved = laws.moved;
   result.moved_unwatched = laws.moved_unwatched;
+  result.recordings = out.recordings;
+  result.found_again = out.found_again;
   result.worst_pose = laws.worst_pose;
   result.worst_age_ms = laws.worst_age_ms;
   result.worst_circles = laws.worst_circles;
@@ -104,6 +106,9 @@ void print(const OperationOutcome& out, const OperationResult& result) {
   fmt::print("overlay whole on {:.1f} % of pictures, {} of {} beyond 1.5 circles, worst {:.2f}; oldest {:.0f} ms\n",
              100 * share, result.beyond, result.judged, result.worst_circles, result.worst_age_ms);
   fmt::print("worst pose {:.2f} of what it may be off; {}\n", result.worst_pose, words_of_faults(result));
+  if (result.recordings > 0)
+    fmt::print("{} recordings of the appliance, with {} events that had reached the window\n", result.recordings,
+               result.found_again);
   fmt::print("{}; hash {}\n", words_of_laws(result), result.hash);
 }
 

@@ -15,7 +15,7 @@ struct OperationResult {
   double minutes = 0;
   std::uint64_t laws_broken = 0, faults = 0, faults_alone = 0, poses = 0, frames = 0, shown = 0, overlaid = 0,
                 green = 0, judged = 0, beyond = 0, registrations = 0, deformations = 0, checks = 0, moved = 0,
-                moved_unwatched = 0;
+                moved_unwatched = 0, recordings = 0, found_again = 0;
   double worst_pose = 0, worst_age_ms = 0, worst_circles = 0, slowest_named_s = 0, slowest_over_s = 0;
   /// By target and kind.
   struct OfFault {

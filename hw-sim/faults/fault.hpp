@@ -55,6 +55,7 @@ enum class FaultKind {
   disk_late,
   disk_full,
   power_cut,
+  appliance_power_cut,
 };
 
 std::string_view fault_name(FaultKind kind);

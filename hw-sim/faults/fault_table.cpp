@@ -68,6 +68,7 @@ constexpr FaultSpec kTable[] = {
     {FaultKind::disk_late, false, false, false, true, WithoutEnd::refused, kDelayMs},
     {FaultKind::disk_full, false, false, false, true, WithoutEnd::refused, {}},
     {FaultKind::power_cut, false, false, false, true, WithoutEnd::refused, kCut},
+    {FaultKind::appliance_power_cut, false, false, false, true, WithoutEnd::refused, {}},
 };
 
 }  // namespace

@@ -24,6 +24,7 @@ struct LocalNetwork::State {
     std::size_t held = 0;  ///< bytes in parts
     std::size_t read = 0;  ///< of the first part
     bool ended = false;
+    bool silent = false;  ///< the server's machine has gone: the client knows of no end
 
     [[nodiscard]] bool readable(DeviceTime now) const { return parts.empty() ? ended : parts.front().due <= now; }
     /// When what is on its way is there; empty: nothing is.
@@ -39,6 +40,19 @@ struct LocalNetwork::State {
   std::deque<std::unique_ptr<wire::Link>> calling;
   std::vector<std::weak_ptr<OneWay>> ways;
   bool woken = false, listened = false;
+
+  /// What is on its way is lost, on all connections that stand; each becomes as `how` says.
+  void drop(void (*how)(OneWay&)) {
+    const std::lock_guard lock(mutex);
+    for (const auto& one : ways) {
+      const auto way = one.lock();
+      if (!way) continue;
+      way->parts.clear();
+      way->held = way->read = 0;
+      how(*way);
+    }
+    changed.notify_all();
+  }
 };
 
 namespace {
@@ -53,7 +67,7 @@ class LocalLink final : public wire::Link {
       : network_(std::move(network)), end_(end), in_(std::move(in)), out_(std::move(out)) {}
   ~LocalLink() override {
     const std::lock_guard lock(network_->mutex);
-    in_->ended = out_->ended = true;
+    if (end_ == End::client || !in_->silent) in_->ended = out_->ended = true;
     network_->changed.notify_all();
   }
   LocalLink(const LocalLink&) = delete;
@@ -82,6 +96,7 @@ class LocalLink final : public wire::Link {
   Result<std::size_t> write_some(std::span<const std::span<const std::uint8_t>> parts) override {
     const std::lock_guard lock(network_->mutex);
     if (out_->ended) return Error{Errc::disconnected, "the other side has gone"};
+    if (out_->silent) return lost(parts);
     const std::size_t room = network_->settings.holds - std::min(network_->settings.holds, out_->held);
     DeviceTime due = device_now() + network_->settings.delay;
     if (end_ == End::server) due = due + network_->late;
@@ -118,6 +133,12 @@ class LocalLink final : public wire::Link {
   [[nodiscard]] bool writable() const { return out_->held < network_->settings.holds || out_->ended; }
 
  private:
+  static std::size_t lost(std::span<const std::span<const std::uint8_t>> parts) {
+    std::size_t bytes = 0;
+    for (const auto& part : parts) bytes += part.size();
+    return bytes;
+  }
+
   std::shared_ptr<LocalNetwork::State> network_;
   End end_;
   std::shared_ptr<OneWay> in_, out_;
@@ -128,6 +149,11 @@ class LocalListener final : public wire::Listener {
   explicit LocalListener(std::shared_ptr<LocalNetwork::State> network) : network_(std::move(network)) {
     const std::lock_guard lock(network_->mutex);
     network_->listened = true;
+    for (const auto& one : network_->ways) {
+      const auto way = one.lock();
+      if (way && way->silent) way->ended = true;
+    }
+    network_->changed.notify_all();
   }
   ~LocalListener() override {
     std::deque<std::unique_ptr<wire::Link>> nobody_answers;  // ends without the mutex, which it takes
@@ -211,15 +237,11 @@ void LocalNetwork::set_late(Duration late) const {
 }
 
 void LocalNetwork::cut() const {
-  const std::lock_guard lock(state_->mutex);
-  for (const auto& one : state_->ways) {
-    const auto way = one.lock();
-    if (!way) continue;
-    way->parts.clear();
-    way->held = way->read = 0;
-    way->ended = true;
-  }
-  state_->changed.notify_all();
+  state_->drop([](OneWay& way) { way.ended = true; });
+}
+
+void LocalNetwork::fall_silent() const {
+  state_->drop([](OneWay& way) { way.silent = true; });
 }
 
 }  // namespace birdseye::hw_sim

@@ -25,6 +25,9 @@ class LocalNetwork {
   void set_late(Duration late) const;
   /// Cuts all connections that stand, as a cable does that is pulled.
   void cut() const;
+  /// The server's machine has gone without a word: nothing comes from it any more, what is sent to it is lost, and
+  /// connections stand until there is a listener again, which knows nothing of them.
+  void fall_silent() const;
 
   struct State;
 

@@ -7,17 +7,14 @@
 #include <array>
 #include <bit>
 #include <cstring>
-#include <functional>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "calibration/detect/pattern.hpp"
-#include "device/birdseyed/appliance.hpp"
-#include "device/wire/server.hpp"
 #include "drivers/system/clock.hpp"
-#include "drivers/system/disk_keeper.hpp"
 #include "drivers/system/durable.hpp"
 #include "drivers/system/local_programs.hpp"
 #include "drivers/system/wait.hpp"
@@ -31,6 +28,8 @@
 #include "hw-sim/minibird/tracker_loop.hpp"
 #include "hw-sim/operation/bench_path.hpp"
 #include "hw-sim/operation/operation_patient.hpp"
+#include "hw-sim/operation/operation_programs.hpp"
+#include "hw-sim/operation/operation_recording.hpp"
 #include "hw-sim/operation/operation_scene.hpp"
 #include "hw-sim/operation/operation_window.hpp"
 #include "hw-sim/operation/surgeon.hpp"
@@ -43,7 +42,8 @@ struct VideoSize {
   int width_px, height_px;
 };
 constexpr VideoSize kGrey{96, 72}, kPictures{160, 120}, kOfBoard{192, 144};  // smaller, no board is found
-constexpr double kAtBoard = 0.3;  // of operations with pictures: the scope is calibrated at their beginning
+constexpr double kAtBoard = 0.3;   // of operations with pictures: the scope is calibrated at their beginning
+constexpr double kRecords = 0.25;  // of operations: the appliance records
 constexpr double kFaultsFrom_s = 20, kQuietAtEnd_s = 10;
 constexpr double kCalibratedBy_s = 90;  // a turn or zoom over the board would make the calibration wrong for good
 constexpr Duration kScreen = Duration::from_ms(20);  // from one picture on the screen to the next
@@ -124,25 +124,6 @@ class Announcer {
   std::size_t next_ = 0;
 };
 
-device::Config config_of(const OperationTruth& truth, const LocalLine& line, const LocalCamera& camera) {
-  device::Config config;
-  config.tracker.line.device = "/sim/tracker";
-  config.tracker.open_line = [&line](const auto&) { return line.open(); };
-  config.tracker.minibird.birds = static_cast<int>(truth.birds());
-  config.core.bird_names = {"scope", "pointer"};
-  if (truth.birds() > 2) {
-    config.core.bird_names.emplace_back(kReference);
-    config.tracker.reference = kReference;
-  }
-  config.core.pose.smoothing = Duration::from_ms(40);
-  config.core.pose_wait = Duration::from_ms(60);
-  config.camera.width_px = truth.lens(0).width_px;
-  config.camera.height_px = truth.lens(0).height_px;
-  config.camera.rate_hz = kVideo_hz;
-  config.open_camera = [&camera](const auto&) { return camera.open(); };
-  return config;
-}
-
 TrackerScript tracker_of(const OperationTruth& truth, std::uint64_t seed, const FaultScript& faults,
                          std::int64_t zero_ns) {
   TrackerSettings settings;
@@ -167,7 +148,8 @@ std::vector<double> scope_exchanges(const FaultScript& faults) {
 }
 
 /// Events to the workflow until the screen is drawn the next time, as the window takes them.
-void take_events(host::LiveSource& source, host::LiveWorkflow& workflow, OperationLaws& laws, Journal& journal) {
+void take_events(host::LiveSource& source, host::LiveWorkflow& workflow, OperationLaws& laws, Journal& journal,
+                 OperationRecording* recording) {
   const HostTime deadline = host_now() + kScreen;
   bool frame = false;
   while (const auto event = source.next(frame ? host_now() : deadline)) {
@@ -175,6 +157,7 @@ void take_events(host::LiveSource& source, host::LiveWorkflow& workflow, Operati
     frame = frame || std::holds_alternative<wire::VideoFrame>(*event);
     journal.enter(*event, now);
     laws.take(*event, now);
+    if (recording != nullptr) recording->take(*event, now);
     workflow.take(*event, now, source.host_from_device());
   }
 }
@@ -185,106 +168,16 @@ std::string words_of(const host::ShownPicture& shown) {
   return fmt::format("{}: {}", shown.overlaid ? "the overlay fades" : "there is no overlay", shown.reason);
 }
 
-/// birdseyed and its server. An operation ends both and starts them again.
-class ApplianceProgram {
- public:
-  /// records: of the two scopes, as texts; empty where a scope has none.
-  ApplianceProgram(device::Config config, std::array<std::string, 2> records, const LocalNetwork& network)
-      : config_(std::move(config)), records_(std::move(records)), network_(network) {}
-
-  /// Starts it with the record of this scope, or ends it, where it does not run or end already.
-  Result<void> run(bool on, std::size_t scope) {
-    if (on == (appliance_ != nullptr)) return {};
-    appliance_.reset();
-    server_.reset();
-    if (!on) return {};
-    config_.core.calibration = records_[scope];
-    server_ = wire::Server::over(network_.listener());
-    auto started = device::Appliance::start(config_, *server_);
-    if (!started) return std::move(started).error();
-    appliance_ = *std::move(started);
-    return {};
-  }
-
- private:
-  device::Config config_;
-  std::array<std::string, 2> records_;
-  const LocalNetwork& network_;
-  std::unique_ptr<wire::Server> server_;
-  std::unique_ptr<device::Appliance> appliance_;
-};
-
-/// The window, and its connection to the appliance.
-class WindowProgram {
- public:
-  using Open = std::function<Result<std::unique_ptr<host::LiveWorkflow>>()>;
-  WindowProgram(Open open, const LocalNetwork& network) : open_(std::move(open)), network_(network) {}
-
-  /// Opens it, or closes it, where it is not open or closed already. True: it was opened just now.
-  Result<bool> run(bool on) {
-    if (on == (workflow_ != nullptr)) return false;
-    source_.reset();
-    workflow_.reset();
-    if (!on) return false;
-    auto opened = open_();
-    if (!opened) return std::move(opened).error();
-    workflow_ = *std::move(opened);
-    source_ = host::LiveSource::of_client("the appliance", [this]() -> Result<std::unique_ptr<wire::Client>> {
-      return wire::Client::over(network_.connect(), "the appliance");
-    });
-    return true;
-  }
-  [[nodiscard]] host::LiveWorkflow* workflow() const { return workflow_.get(); }
-  [[nodiscard]] host::LiveSource& source() const { return *source_; }
-
- private:
-  Open open_;
-  const LocalNetwork& network_;
-  std::unique_ptr<host::LiveWorkflow> workflow_;
-  std::unique_ptr<host::LiveSource> source_;
-};
-
-/// The disk of the window's machine, and whether that machine has power.
-class WindowDisk {
- public:
-  WindowDisk(LocalDisk& disk, WindowProgram& window) : disk_(disk), window_(window) { DiskKeeper::put(&disk); }
-  ~WindowDisk() { DiskKeeper::put(nullptr); }
-  WindowDisk(const WindowDisk&) = delete;
-  WindowDisk& operator=(const WindowDisk&) = delete;
-
-  /// What befalls it now. Where it has power again, it has what the disk kept. True: it has power.
-  Result<bool> befall(const FaultTimeline& befalling, double at_s) {
-    const Fault* const late = befalling.active(FaultKind::disk_late);
-    disk_.set_late(Duration::from_seconds(late != nullptr ? late->value("ms") * 1e-3 : 0));
-    disk_.set_full(befalling.active(FaultKind::disk_full) != nullptr);
-    const Fault* const cut = befalling.active(FaultKind::power_cut);
-    if (cut != nullptr) {
-      if (!std::exchange(cutting_, true)) disk_.lose_power_after(static_cast<std::uint64_t>(cut->value("after_syncs")));
-      // Where nothing is written any more.
-      if (at_s > cut->at_s + cut->for_s.value_or(0) / 2) disk_.lose_power();
-      return !disk_.powerless();
-    }
-    if (!std::exchange(cutting_, false)) return true;
-    disk_.lose_power();
-    if (const auto closed = window_.run(false); !closed) return closed.error();
-    if (const auto up = disk_.power_up(); !up) return up.error();
-    return true;
-  }
-
- private:
-  LocalDisk& disk_;
-  WindowProgram& window_;
-  bool cutting_ = false;
-};
-
 std::size_t heap_bytes_in_use() {
   const struct mallinfo2 info = mallinfo2();
   return info.uordblks + info.hblkhd;
 }
 
-/// Runs the operation, in virtual time. open: opens a window. scene: null where the video is grey.
+/// Runs the operation, in virtual time. open: opens a window. scene: null where the video is grey. recording: null
+/// where the appliance records nothing.
 void operate(const SimulatedOperation& operation, OperationTruth& truth, OperationScene* scene,
-             const host::Authors& authors, LocalDisk& disk, const WindowProgram::Open& open, OperationOutcome& out) {
+             const host::Authors& authors, OperationRecording* recording, LocalDisk& disk,
+             const WindowProgram::Open& open, OperationOutcome& out) {
   const std::int64_t zero_ns = device_now().ns;
   const LocalLine line("sim:tracker");
   TrackerLoop unit(line.instrument(), tracker_of(truth, operation.seed, out.faults, zero_ns), {});
@@ -305,7 +198,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
   std::array<std::string, 2> records;
   for (std::size_t scope = 0; scope < records.size() && !truth.at_board(0); ++scope)
     records[scope] = host::record_text(truth.record_of(scope), *authors.machine);
-  ApplianceProgram appliance(config_of(truth, line, camera), std::move(records), network);
+  ApplianceProgram appliance(truth, line, camera, network, std::move(records), recording);
   WindowProgram window(open, network);
   WindowDisk window_disk(disk, window);
   FaultTimeline befalling(out.faults.programs, FaultTarget::program);
@@ -318,6 +211,11 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
   Announcer announcer(out.faults);
   std::string said, step, screen;
   bool had_power = true;
+  std::vector<BrokenLaw> not_recorded;
+  const auto judge_recording = [&] {
+    const std::string wrong = recording != nullptr ? recording->judge() : "";
+    if (!wrong.empty()) not_recorded.push_back({journal.at_s(host_now()), "recorded", wrong});
+  };
   double acts_at_s = 0, memory_at_s = 0;
   const HostTime end = host_now() + Duration::from_seconds(operation.minutes * 60);
   while (host_now() < end) {
@@ -328,10 +226,13 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     }
     const Fault* const late = befalling.active(FaultKind::link_late);
     network.set_late(Duration::from_seconds(late != nullptr ? late->value("ms") * 1e-3 : 0));
+    if (befalling.active(FaultKind::appliance_power_cut) != nullptr) appliance.lose_power();
     const bool ends = befalling.active(FaultKind::appliance_restart) != nullptr ||
-                      befalling.active(FaultKind::scope_exchanged) != nullptr;
+                      befalling.active(FaultKind::scope_exchanged) != nullptr ||
+                      befalling.active(FaultKind::appliance_power_cut) != nullptr;
     const auto serves = appliance.run(!ends, truth.scope_in_use(journal.at_s(host_now())));
     if (!serves) return out.broken.push_back({journal.at_s(host_now()), "start", serves.error().what});
+    if (ends) judge_recording();
     const auto powered = window_disk.befall(befalling, journal.at_s(host_now()));
     if (!powered) return out.broken.push_back({journal.at_s(host_now()), "start", powered.error().what});
     if (std::exchange(had_power, *powered) && !*powered) journal.say(host_now(), "the window's machine has no power");
@@ -354,7 +255,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
       laws.stood_still();
       continue;
     }
-    take_events(source, workflow, laws, journal);
+    take_events(source, workflow, laws, journal, recording);
     workflow.set_link(source.connected(), source.words(), source.may_retry());
     workflow.tick();
     workflow.draw();
@@ -381,8 +282,15 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
                                view.guide_lines.empty() ? note.line : view.guide_lines.back()));
     journal.follow(now, said, "the appliance: " + view.link.appliance_says);
   }
+  (void)appliance.run(false, 0);
+  judge_recording();
   laws.finish(operation.minutes * 60);
   out.broken = laws.broken();
+  std::ranges::move(not_recorded, std::back_inserter(out.broken));
+  if (recording != nullptr) {
+    out.recordings = recording->judged();
+    out.found_again = recording->found_again();
+  }
   out.laws = laws.figures();
   out.registrations = surgeon.registrations();
   out.deformations = surgeon.deformations();
@@ -397,6 +305,7 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
   OperationOutcome out;
   const bool reference = operation.reference.value_or(hashed_uniform(hashed_word(operation.seed, 5), 0) < 0.5);
   out.reference = reference;
+  const bool records = operation.records.value_or(hashed_uniform(hashed_word(operation.seed, 18), 0) < kRecords);
   const bool at_board = operation.pictures && hashed_uniform(hashed_word(operation.seed, 8), 0) < kAtBoard;
   const double ends_s = operation.minutes * 60;
   if (operation.faults) {
@@ -415,6 +324,7 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
       add(out.faults.programs, draw_delays(operation.seed, kFaultsFrom_s, until_s));
       if (!at_board) add(out.faults.programs, draw_scope_exchanges(operation.seed, kFaultsFrom_s, until_s));
       if (reference) add(out.faults.world, draw_tilts(operation.seed, kFaultsFrom_s, until_s));
+      if (records) add(out.faults.programs, draw_appliance_power_cuts(operation.seed, kFaultsFrom_s, until_s));
     }
     if (operation.pictures && !reference) draw_bumps_in_view(operation.seed, kFaultsFrom_s, until_s, out.faults);
     if (operation.pictures && operation.more_befalls)
@@ -455,13 +365,16 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
   const auto kept = (*folder)->path() / "window";
   if (const auto made = make_folder_durably(kept); !made) return made.error();
   LocalDisk disk(kept, hashed_word(operation.seed, 10));
+  std::optional<OperationRecording> recording;
+  if (records) recording.emplace((*folder)->path(), hashed_word(operation.seed, 19));
   const auto open = [&] { return open_window(window, truth, authors, kept); };
   // The first window reads its files before virtual time begins.
   auto first = open();
   if (!first) return std::move(first).error();
   const auto open_next = [&] { return *first != nullptr ? std::exchange(*first, nullptr) : open(); };
-  const auto ran = run_in_virtual_time({.seed = operation.seed},
-                                       [&] { operate(operation, truth, scene.get(), authors, disk, open_next, out); });
+  const auto ran = run_in_virtual_time({.seed = operation.seed}, [&] {
+    operate(operation, truth, scene.get(), authors, recording ? &*recording : nullptr, disk, open_next, out);
+  });
   if (!ran) return ran.error();
   out.time = *ran;
   for (const BrokenLaw& law : out.broken)

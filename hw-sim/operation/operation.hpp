@@ -22,6 +22,7 @@ struct SimulatedOperation {
   /// And the network is slow, the window stands still, the table is tilted, and the scope is exchanged for another,
   /// which has a record of its own; with pictures, the scope turns in its holder, the lens is zoomed, the organ is cut.
   bool more_befalls = true;
+  std::optional<bool> records{};    ///< the appliance records, and loses its power; none: the seed decides
   std::optional<bool> reference{};  ///< a reference bird is fixed on the patient; none: the seed decides
   bool pictures = false;            ///< the video shows what the scope sees; else it is grey all over, and small
 };
@@ -33,8 +34,9 @@ struct OperationOutcome {
   VirtualTimeFigures time;
   bool reference = false;  ///< there was a reference bird
   std::size_t registrations = 0, deformations = 0, checks = 0;
-  FaultScript faults;      ///< that befell
-  std::string log;         ///< what happened, a line each
+  std::uint64_t recordings = 0, found_again = 0;  ///< recordings that were judged, and what of the host's was in them
+  FaultScript faults;                             ///< that befell
+  std::string log;                                ///< what happened, a line each
   std::uint64_t hash = 0;  ///< of every event that reached the host, and of all that was on the screen
 };
 

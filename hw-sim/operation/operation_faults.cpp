@@ -85,6 +85,8 @@ constexpr DrawnFault kDrawnTilts[] = {{FaultKind::bed_tilted, kWorld, 10, 90, "d
 
 constexpr DrawnFault kDrawnOfScopes[] = {{FaultKind::scope_exchanged, kProgram, 2, 20}};
 
+constexpr DrawnFault kDrawnOfAppliance[] = {{FaultKind::appliance_power_cut, kProgram, 2, 20}};
+
 constexpr DrawnFault kDrawnOfDisk[] = {
     {FaultKind::disk_late, kProgram, 5, 20, "ms", 10, 1500},
     {FaultKind::disk_full, kProgram, 5, 60},
@@ -130,13 +132,21 @@ FaultSigns of_camera(const Fault& fault) {
 
 constexpr double kFlockStarts_s = 1.5;  // the waits that a flock needs from its first answer to its first record
 
+}  // namespace
+
+bool starts_appliance(FaultKind kind) {
+  return kind == FaultKind::appliance_restart || kind == FaultKind::scope_exchanged ||
+         kind == FaultKind::appliance_power_cut;
+}
+
+namespace {
+
 FaultSigns of_program(const Fault& fault) {
   if (fault.kind == FaultKind::disk_full) return {.aside = true};
   if (fault.kind == FaultKind::disk_late) return {};  // a window that is closed waits for it
   constexpr double kConnects_s = 1.1;                 // the window tries each second
   if (fault.kind == FaultKind::link_late) return {.own_s = kConnects_s + fault.value("ms") * 1e-3};
-  const bool tracker_starts = fault.kind == FaultKind::appliance_restart || fault.kind == FaultKind::scope_exchanged;
-  return {.own_s = kConnects_s + (tracker_starts ? kFlockStarts_s : 0)};
+  return {.own_s = kConnects_s + (starts_appliance(fault.kind) ? kFlockStarts_s : 0)};
 }
 
 }  // namespace
@@ -250,6 +260,10 @@ std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double
 
 std::vector<Fault> draw_scope_exchanges(std::uint64_t seed, double from_s, double until_s) {
   return all_drawn(kDrawnOfScopes, hashed_word(seed, 12), 300, from_s, until_s);
+}
+
+std::vector<Fault> draw_appliance_power_cuts(std::uint64_t seed, double from_s, double until_s) {
+  return all_drawn(kDrawnOfAppliance, hashed_word(seed, 17), 200, from_s, until_s);
 }
 
 std::vector<Fault> draw_delays(std::uint64_t seed, double from_s, double until_s) {

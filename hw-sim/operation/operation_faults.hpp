@@ -30,6 +30,9 @@ struct FaultSigns {
 /// times of that.
 inline constexpr double kUnseenChange_mm = 30;
 
+/// Whether birdseyed ends by it, and is started at its end.
+bool starts_appliance(FaultKind kind);
+
 /// Of a fault of the tracker, the camera or a program. Nothing to be seen: both lists are empty.
 FaultSigns signs_of(const Fault& fault, FaultTarget target);
 
@@ -49,6 +52,8 @@ std::vector<Fault> draw_delays(std::uint64_t seed, double from_s, double until_s
 std::vector<Fault> draw_tilts(std::uint64_t seed, double from_s, double until_s);
 /// The scope is exchanged for another, and for the first again.
 std::vector<Fault> draw_scope_exchanges(std::uint64_t seed, double from_s, double until_s);
+/// The appliance loses its power.
+std::vector<Fault> draw_appliance_power_cuts(std::uint64_t seed, double from_s, double until_s);
 /// What befalls the machine of the window: its disk is late, or full, or its power is cut.
 std::vector<Fault> draw_disk_faults(std::uint64_t seed, double from_s, double until_s);
 

@@ -70,10 +70,6 @@ bool moves_birds(const Fault& fault) {
   }
 }
 
-bool starts_appliance(FaultKind kind) {
-  return kind == FaultKind::appliance_restart || kind == FaultKind::scope_exchanged;
-}
-
 /// On the operation's clock. Infinite: it lasts for good.
 double end_of(const Fault& fault) {
   if (fault.for_s) return fault.at_s + *fault.for_s;

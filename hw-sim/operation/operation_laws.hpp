@@ -47,6 +47,7 @@ struct BrokenLaw {
 ///   something was not kept, or what it had later: the registration with its deformation, and the calibration over the
 ///   board. It draws nothing before a landmark has been checked. What was taken back, and nothing else was kept, it
 ///   does not take up. A window that cannot keep something says so within 2 s.
+/// - recorded: what the appliance records is as OperationRecording says. (Judged there.)
 /// - memory: it does not grow later than two minutes after the beginning, and 30 s after the first matching of the CT
 ///   with the video begins.
 class OperationLaws {

@@ -178,8 +178,14 @@ MUTANTS = (
            "    if (auto synced = sync_file(part_of(file.path)); !synced) return give_up(synced.error());\n", "",
            "A file gets its name before its bytes are on the disk.", r"^WriteFiles\.IsOnTheDiskByItsName",
            ("host_files_test",)),
-    # What no campaign can see: no lock and no disk of the appliance is in it, no queue is full, and the latency is none.
-    Mutant("folder-fsync", "device/birdseyed/recorder.cpp",
+    Mutant("seldom-synced", "device/birdseyed/recorder.cpp",
+           "constexpr Duration kSyncEvery = Duration::from_ms(500);",
+           "constexpr Duration kSyncEvery = Duration::from_ms(5000);",
+           "A power cut of the appliance loses five seconds of its recording, not one.",
+           r"^OperationRecording\.APowerCutOfTheAppliance", OPERATION),
+    # What no campaign can see: no lock is in it, nor the names of an appliance's disk, no queue is full, and the latency
+    # is none.
+    Mutant("folder-fsync", "device/birdseyed/record_file.cpp",
            "bool named_ = false;", "bool named_ = true;",
            "A recording's name is never brought onto the disk.", r"^Recorder\.KeepsEverythingItIsGiven", BIRDSEYED, False),
     Mutant("recording-checksum", "device/birdseyed/recording.cpp",

@@ -85,9 +85,10 @@ class DiskFile : public RecordFile {
 std::unique_ptr<Recorder> record_to(const std::shared_ptr<Disk>& disk) {
   RecordConfig config;
   config.folder = "/nowhere";
-  return *Recorder::start(config, {}, [disk](const RecordConfig&) -> Result<NewRecordFile> {
+  config.create = [disk](const auto&) -> Result<NewRecordFile> {
     return NewRecordFile{std::make_unique<DiskFile>(disk), "/nowhere/r.berec"};
-  });
+  };
+  return *Recorder::start(config, {});
 }
 
 TEST(Recorder, ADiskThatDoesNotKeepUpEndsItAtTheBoundAndAtOnce) {
@@ -154,9 +155,10 @@ TEST(Recorder, ADiskThatDoesNotAnswerAtTheStartIsAnError) {
   disk->let_through = 0;
   RecordConfig config;
   config.folder = "/nowhere";
-  const auto recorder = Recorder::start(config, {}, [disk](const RecordConfig&) -> Result<NewRecordFile> {
+  config.create = [disk](const auto&) -> Result<NewRecordFile> {
     return NewRecordFile{std::make_unique<DiskFile>(disk), "/nowhere/r.berec"};
-  });
+  };
+  const auto recorder = Recorder::start(config, {});
   ASSERT_FALSE(recorder);
   EXPECT_NE(recorder.error().what.find("does not answer"), std::string::npos);
   disk->let(10);
@@ -204,12 +206,13 @@ class DoomedFile : public RecordFile {
 };
 
 /// Records until there were three syncs and more was written since.
-[[noreturn]] void record_until_killed(const RecordConfig& config, bool power_fails, Counted& counted) {
-  auto recorder = Recorder::start(config, {}, [&](const RecordConfig& c) -> Result<NewRecordFile> {
-    auto made = create_record_file(c);
+[[noreturn]] void record_until_killed(RecordConfig config, bool power_fails, Counted& counted) {
+  config.create = [&](const std::filesystem::path& folder) -> Result<NewRecordFile> {
+    auto made = create_record_file(folder);
     if (made) made->file = std::make_unique<DoomedFile>(std::move(made->file), power_fails, counted);
     return made;
-  });
+  };
+  auto recorder = Recorder::start(config, {});
   if (!recorder) {
     std::fprintf(stderr, "%s\n", recorder.error().what.c_str());
     ::_exit(1);

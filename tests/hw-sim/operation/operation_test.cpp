@@ -379,8 +379,9 @@ TEST(OperationFaults, EveryFaultOfAnInstrumentCanBefall) {
     const FaultScript script = draw_faults(seed, 0, 3600, true);
     for (const Fault& fault : script.tracker) drawn.push_back("tracker " + std::string(fault_name(fault.kind)));
     for (const Fault& fault : script.camera) drawn.push_back("camera " + std::string(fault_name(fault.kind)));
-    for (const auto& faults : {draw_program_faults(seed, 0, 3600), draw_delays(seed, 0, 3600),
-                               draw_scope_exchanges(seed, 0, 3600), draw_disk_faults(seed, 0, 3600)})
+    for (const auto& faults :
+         {draw_program_faults(seed, 0, 3600), draw_delays(seed, 0, 3600), draw_scope_exchanges(seed, 0, 3600),
+          draw_disk_faults(seed, 0, 3600), draw_appliance_power_cuts(seed, 0, 3600)})
       for (const Fault& fault : faults) drawn.push_back("program " + std::string(fault_name(fault.kind)));
   }
   for (const FaultSpec& spec : fault_table()) {
