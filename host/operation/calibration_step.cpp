@@ -16,6 +16,11 @@ bool is_same(const CalibratedScope& one, const CalibratedScope& other) {
          one.scope.camera_from_sensor().matrix() == other.scope.camera_from_sensor().matrix();
 }
 
+/// By what the appliance told as the board was used, and by a record of it now.
+bool is_other_scope(const CalibratedScope& by_board, const std::string& now) {
+  return !by_board.record_scope.empty() && !now.empty() && by_board.record_scope != now;
+}
+
 }  // namespace
 
 void CalibrationStep::begin(const std::string& bird, const std::optional<calibration::Pattern>& board) {
@@ -85,6 +90,7 @@ bool CalibrationStep::tick(const Instruments& found_with) {
   auto guided = guide_.take();
   if (!guided || !finish(*guided)) return false;
   found_->found_with = found_with;
+  found_->record_scope = record_scope_;
   return true;
 }
 
@@ -107,9 +113,11 @@ bool CalibrationStep::finish(const Result<GuidedCalibration>& guided) {
 CalibrationStep::Adopted CalibrationStep::adopt(const calibration::CalibrationRecord& record) {
   auto scope = ScopeSetup::of_record(record);
   if (!scope) return Adopted::no;
+  record_scope_ = record.scope;
   const std::string& made_utc = record.hand_eye->provenance.made_utc;
   const auto& before = rests_on();
-  if (before && before->by_board && made_utc <= before->made_utc) return Adopted::no;
+  if (before && before->by_board && made_utc <= before->made_utc && !is_other_scope(*before, record.scope))
+    return Adopted::no;
   CalibratedScope adopted{*std::move(scope), made_utc, false, {record.tracker, record.camera}, record.scope};
   const bool anew = before && !is_same(*before, adopted);
   take(std::move(adopted), words("note_record_of", made_utc));
@@ -123,7 +131,7 @@ bool CalibrationStep::take_up(const CalibratedScope& kept, const std::string& li
     if (!now) former_ = kept;
     return !now || is_same(*now, kept);
   }
-  if (found_ && kept.made_utc <= found_->made_utc) return false;
+  if (found_ && (kept.made_utc <= found_->made_utc || is_other_scope(kept, record_scope_))) return false;
   if (!kept.scope.figures().held_out_px) {
     // Nothing could be drawn by it.
     if (!found_) note_.line = words("note_kept_unknown");

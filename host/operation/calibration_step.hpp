@@ -11,7 +11,8 @@
 
 namespace birdseye::host {
 
-/// The scope's calibration: by the board, on a thread of the guide's own, or by a record; of two the newer counts.
+/// The scope's calibration: by the board, on a thread of the guide's own, or by a record; of two the newer counts. But
+/// where the appliance had a record as the board was used, and has one of another scope now, that record counts.
 class CalibrationStep {
  public:
   /// Over the board; nothing without one, or where it has begun. bird: the scope's.
@@ -66,6 +67,7 @@ class CalibrationStep {
 
   std::optional<CalibratedScope> found_, held_back_;
   std::optional<CalibratedScope> former_;  ///< of an earlier window, by a record that has not come yet
+  std::string record_scope_;               ///< the scope of the appliance's last record
   std::string line_;                       ///< of what is held back, as it was found
   bool person_may_say_ = false;
   StepNote note_;

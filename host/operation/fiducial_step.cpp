@@ -81,6 +81,7 @@ bool FiducialStep::take_up(const std::optional<RegisteredPatient>& kept, const s
   registered_ = kept;
   found_with_ = kept->found_with;
   confirmed_ = false;
+  fits_poorly_ = kept->fre_mm > kGoodFit_mm;
   note_ = {true, words("note_taken_up_fre", when, kept->fre_mm)};
   return true;
 }
@@ -89,6 +90,7 @@ void FiducialStep::doubt() {
   if (registered_) confirmed_ = false;
   if (registered_ || touches_.empty()) return;
   touches_.clear();
+  held_back_ = false;
   note_ = {false, words("note_touch_anew")};
 }
 

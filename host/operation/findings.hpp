@@ -21,10 +21,11 @@ struct GuidedCalibration;
 /// How the scope is calibrated.
 struct CalibratedScope {
   ScopeSetup scope;
-  std::string made_utc;      ///< 2026-11-22T09:30:00Z
-  bool by_board = false;     ///< here, by the board; else by a record
-  Instruments found_with{};  ///< of one by a record, those that the record is of, which the appliance judges
-  std::string scope_name{};  ///< as its owner calls it; empty: nobody has told it, as over the board
+  std::string made_utc;        ///< 2026-11-22T09:30:00Z
+  bool by_board = false;       ///< here, by the board; else by a record
+  Instruments found_with{};    ///< of one by a record, those that the record is of, which the appliance judges
+  std::string scope_name{};    ///< as its owner calls it; empty: nobody has told it, as over the board
+  std::string record_scope{};  ///< over the board: the scope of the record that the appliance had then; empty: none
 };
 /// By what was solved of stations over the board. Refuses, with the first reason, what the verdict fails.
 Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, const std::string& made_utc);

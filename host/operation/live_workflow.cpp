@@ -223,7 +223,7 @@ void LiveWorkflow::fit() {
   const bool same =
       before && registered && before->tracker_from_patient.matrix() == registered->tracker_from_patient.matrix();
   if (!same) off_mm_.clear();
-  scope_came_.reset();  // how long it was away before counts no more
+  note_looked_at();
   asked_to_take_back_.reset();
   if (fiducials_.confirmed()) why_doubted_.clear();
   forget_views(words("note_views_touched_anew"));
@@ -278,6 +278,7 @@ void LiveWorkflow::update_setup() {
                               is_other_patients() ? words("patient_other") : words("patient_unconfirmed"));
   if (calibration_.held_back())
     return picture_.set_setup(std::nullopt, {}, words("why_calibration_held", calibration_.note().line));
+  if (calibration_.guiding()) return picture_.set_setup(std::nullopt, {}, words("why_calibrating"));
   if (!may) return picture_.set_setup(std::nullopt, {}, why_unregistered());
   const ScopeSetup turned = *scope_as_it_is();
   TrustFigures figures = trust_figures(turned.figures(), *registered, target_in_patient_mm(*patient_.plan()));
@@ -399,7 +400,10 @@ void LiveWorkflow::take_back(std::size_t touch) {
 void LiveWorkflow::undo() {
   if (step_ == LiveStep::fiducials && !fiducials_.touches().empty()) take_back(fiducials_.touches().size() - 1);
   if (step_ == LiveStep::views && !strokes_.undo(views_.views().size())) views_.undo();
-  if (step_ == LiveStep::check) patient_.undo_landmark();
+  if (step_ == LiveStep::check) {
+    patient_.undo_landmark();
+    landmarks_before_doubt_ = std::min(landmarks_before_doubt_, patient_.landmarks().size());
+  }
   if (step_ == LiveStep::deform && deformation_.found() && !deformation_.running()) {
     deformation_.undo();
     show_shape();

@@ -136,6 +136,8 @@ class LiveWorkflow {
   /// A frame or a pose has come; came: when the one before it did, and then this one. Doubts the registration after a
   /// long pause, if that counts.
   void note_pause(HostTime now, std::optional<HostTime>& came, bool counts);
+  void note_looked_at();
+  void note_landmarks();
   [[nodiscard]] bool asks_for_patient() const;
   [[nodiscard]] bool is_other_patients() const;
   void forget_views(const std::string& why);
@@ -166,7 +168,9 @@ class LiveWorkflow {
   bool frozen_ = false, patient_confirmed_ = false;
   bool simulated_ = false;              ///< nobody lies there
   std::optional<HostTime> video_came_;  ///< the newest frame
-  std::optional<HostTime> scope_came_;  ///< the scope's newest pose
+  std::optional<HostTime> scope_came_;  ///< the scope's newest pose, or later where the patient was touched since
+  std::optional<HostTime> watched_;     ///< the newest frame by which it was watched that video and poses agree
+  bool guided_ = false;                 ///< the scope was being calibrated over the board then
   ConnectedInstruments instruments_;
   PictureHardware taken_with_;
   ReferenceSensor reference_;

@@ -1,6 +1,7 @@
 // What speaks against what was found, and the landmark that a person checks it by.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "host/operation/landmark_check.hpp"
 #include "host/operation/live_workflow.hpp"
@@ -13,8 +14,9 @@ namespace {
 // What is off by more is not drawn by, whatever the figures say: the gate's limit of the target's expected error.
 constexpr double kMostCheckedOff_mm = OverlayGate::Settings().most_target_mm;
 
-// Whoever was away from the patient for so long does not know what was moved meanwhile.
-constexpr Duration kPause = Duration::from_ms(10'000);
+// Whoever was away from the patient for so long does not know what was moved meanwhile. A scope that was away as the
+// patient was touched has longer to come.
+constexpr Duration kPause = Duration::from_ms(10'000), kToBringScope = Duration::from_ms(60'000);
 
 }  // namespace
 
@@ -40,15 +42,25 @@ void LiveWorkflow::note_pause(HostTime now, std::optional<HostTime>& came, bool 
   if (paused && counts && !reference_.in_use()) doubt_registration("");
 }
 
+/// Somebody has just seen where the patient lies: how long the scope was away before counts no more.
+void LiveWorkflow::note_looked_at() {
+  scope_came_ = heard_ + (kToBringScope - kPause);
+}
+
+/// Something begins to speak against the registration: those that are known now may tell whether it holds.
+void LiveWorkflow::note_landmarks() {
+  if (fiducials_.confirmed() && !fiducials_.suspected()) landmarks_before_doubt_ = patient_.landmarks().size();
+}
+
 void LiveWorkflow::doubt_registration(const std::string& why) {
   if (!fiducials_.registered_or_held_back() && fiducials_.touches().empty()) return;
   why_doubted_ = why;
+  note_landmarks();
   fiducials_.doubt();
   pointer_ = {};  // where it was before tells nothing of what has moved since
   fits_at_mm_.reset();
   off_mm_.clear();
-  landmarks_before_doubt_ = patient_.landmarks().size();
-  if (!fiducials_.registered_or_held_back()) return update_setup();
+  if (!fiducials_.registered_or_held_back()) return follow_held_back();
   run_ = {};
   checked_.reset();
   check_ = {false, why};
@@ -71,9 +83,12 @@ void LiveWorkflow::watch_surface(HostTime now) {
 }
 
 void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
-  // The board's squares look alike, one after the other.
-  const auto scope = step_ == LiveStep::calibrate ? std::nullopt : scope_as_it_is();
-  if (!scope) return;
+  const bool guided = calibration_.guiding();
+  if (std::exchange(guided_, guided) != guided) update_setup();
+  // Over the board nothing is watched: its squares look alike, one after the other.
+  const auto scope = guided ? std::nullopt : scope_as_it_is();
+  if (!scope) return video_.look_away(frame.info.acquired);
+  note_pause(heard_, watched_, settings_.video_must_agree);
   const VideoWatch::News news = video_.take(frame, *scope, picture_.target_in_camera_mm(frame));
   if (news.field) update_setup();
   if (!settings_.video_must_agree) return;
@@ -81,6 +96,7 @@ void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
   if (news.contradicted) doubt_registration(words("why_video_differs"));
   // To ask at each picture would let nobody register. Once they agree it tells whether it is done since.
   if (news.again && !fiducials_.suspected()) {
+    note_landmarks();
     fiducials_.suspect();
     if (fiducials_.suspected()) pointer_ = {};
     fits_at_mm_.reset();
@@ -140,10 +156,7 @@ void LiveWorkflow::check_registration() {
 void LiveWorkflow::check_undoubted(const std::optional<CheckReading>& reading) {
   constexpr double kPointedAt_mm = 100;  // further away the pointer is laid aside
   const bool pointed_at = reading && reading->distance_mm <= kPointedAt_mm;
-  if (pointed_at && reading->distance_mm > kMostCheckedOff_mm) {
-    landmarks_before_doubt_ = patient_.landmarks().size();
-    return refuse_registration(*reading);
-  }
+  if (pointed_at && reading->distance_mm > kMostCheckedOff_mm) return refuse_registration(*reading);
   if (pointed_at) off_mm_[reading->nearest] = reading->distance_mm;
   if (pointed_at && !reading->fitted) return confirm_registration(*reading);
   if (!checked_) check_.line = words("note_unchecked");
@@ -168,6 +181,7 @@ void LiveWorkflow::refuse_registration(const CheckReading& by) {
   checked_.reset();
   fits_at_mm_.reset();
   off_mm_.clear();
+  note_landmarks();
   fiducials_.doubt();
   update_setup();
 }
@@ -179,7 +193,7 @@ void LiveWorkflow::confirm_registration(const std::optional<CheckReading>& by) {
   fiducials_.confirm();
   fits_at_mm_.reset();
   why_doubted_.clear();
-  if (by) scope_came_.reset();
+  if (by) note_looked_at();
   update_setup();
   go_to(LiveStep::run);
 }

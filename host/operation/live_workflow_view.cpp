@@ -144,7 +144,8 @@ std::optional<CheckReading> LiveWorkflow::check_reading() const {
   if (!tip_mm || !registered || !patient_.plan()) return std::nullopt;
   const auto& markers = patient_.markers_in_patient_mm();
   std::span<const NamedPoint> landmarks = patient_.landmarks();
-  if (!fiducials_.confirmed()) landmarks = landmarks.first(std::min(landmarks.size(), landmarks_before_doubt_));
+  if (!fiducials_.confirmed() || fiducials_.suspected())
+    landmarks = landmarks.first(std::min(landmarks.size(), landmarks_before_doubt_));
   return check_by_landmarks(*tip_mm, *registered, landmarks, markers ? *markers : registered->fiducials_in_patient_mm,
                             deformation_.found().get());
 }

@@ -82,6 +82,7 @@ Json json_of(const CalibratedScope& found) {
               {"fx_fy_cx_cy_k1_k2_p1_p2_k3", std::vector<double>(parameters.begin(), parameters.end())}}},
             {"camera_from_sensor", rows_of(found.scope.camera_from_sensor().matrix())}};
   if (!found.scope_name.empty()) json["scope"] = found.scope_name;
+  if (!found.record_scope.empty()) json["record_of_scope"] = found.record_scope;
   if (const auto& covariance = found.scope.camera_covariance()) json["lens"]["covariance"] = rows_of(*covariance);
   if (const auto& field = found.scope.round_field())
     json["lens"]["round_field"] = calibration::json_of_round_field(*field);
@@ -146,6 +147,7 @@ Result<CalibratedScope> calibrated_of(const Json& json) {
   CalibratedScope out{*std::move(scope), json.at("made_utc").get<std::string>(),
                       json.at("made_from").get<std::string>() == "board", instruments_of(json),
                       json.value("scope", "")};
+  out.record_scope = json.value("record_of_scope", "");
   if (auto sound = check_figures(out); !sound) return sound.error();
   return out;
 }

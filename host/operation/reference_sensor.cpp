@@ -18,7 +18,10 @@ constexpr Duration kApart = Duration::from_ms(100);
 
 // A tilting table moves a sensor 300 mm off its axis at 20 mm/s and turns at 4 deg/s; a hand or a cable pulls faster.
 constexpr double kMostMm = 4, kMostDeg = 2;  // in kApart
-constexpr double kMostSigmas = 6;            // of a tracker that scatters by more than that
+// By so much more a bird may have moved otherwise than with the reference: what a hand does, and what the lever makes
+// of noise. A reference that slips in the moment in which the transmitter is bumped may not hide in it.
+constexpr double kMostSlackMm = 3, kMostSlackDeg = 1.5;
+constexpr double kMostSigmas = 6;  // of a tracker that scatters by more than that
 
 PoseHistory::Settings averaging(Duration most_predicted) {
   PoseHistory::Settings settings;
@@ -27,21 +30,31 @@ PoseHistory::Settings averaging(Duration most_predicted) {
   return settings;
 }
 
-/// Where a bird was, averaged, and where it is kApart later.
+/// Where a bird was, averaged, and where it is later.
 struct Move {
   Transform<Tracker, Sensor> before, after;
   double sigma_mm = 0;
+  Duration apart = kApart;
 
   /// What takes the tracker as this bird had it before to how it has it after, were the bird at rest.
   [[nodiscard]] Transform<Tracker, Tracker> of_tracker() const { return after * before.inverse(); }
 };
 
-std::optional<Move> move_of(const PoseHistory& history, DeviceTime at) {
+std::optional<Move> move_of(const PoseHistory& history, DeviceTime at, Duration apart = kApart) {
   const DeviceTime after = at - kHalfWindow;
-  const PoseAnswer now = history.at(after), then = history.at(after - kApart);
+  const PoseAnswer now = history.at(after), then = history.at(after - apart);
   if (!now.tracker_from_sensor || !then.tracker_from_sensor) return std::nullopt;
   return Move{*then.tracker_from_sensor, *now.tracker_from_sensor,
-              std::hypot(now.position_sigma_mm, then.position_sigma_mm)};
+              std::hypot(now.position_sigma_mm, then.position_sigma_mm), apart};
+}
+
+/// Over kApart; where there is a hole then, from before it.
+std::optional<Move> newest_move_of(const PoseHistory& history, DeviceTime at) {
+  constexpr Duration kStep = Duration::from_ms(10);
+  std::optional<Move> move;
+  for (Duration apart = kApart; !move && apart <= kApart + kLost; apart = apart + kStep)
+    move = move_of(history, at, apart);
+  return move;
 }
 
 double turn_deg(const Eigen::Matrix3d& rotation) {
@@ -134,20 +147,23 @@ ReferenceSensor::Relative ReferenceSensor::of_birds(const wire::Birds& birds) {
 /// A bumped transmitter moves all birds alike, as this one says; a reference that came off moves alone. Where another
 /// bird stayed, or none went along, it moved alone.
 bool ReferenceSensor::came_off(DeviceTime at) const {
-  const auto own = move_of(in_tracker_.at(name_), at);
+  const auto own = newest_move_of(in_tracker_.at(name_), at);
   if (!own) return false;
-  const double most_mm = std::max(kMostMm, kMostSigmas * std::sqrt(3.0) * own->sigma_mm);
+  const double longer = own->apart.seconds() / kApart.seconds();
+  const double most_mm = std::max(longer * kMostMm, kMostSigmas * std::sqrt(3.0) * own->sigma_mm);
   const Transform<Tracker, Tracker> by = own->of_tracker();
-  if ((own->after.translation() - own->before.translation()).norm() <= most_mm && turn_deg(by.rotation()) <= kMostDeg)
+  if ((own->after.translation() - own->before.translation()).norm() <= most_mm &&
+      turn_deg(by.rotation()) <= longer * kMostDeg)
     return false;
   bool along = false;
   for (const auto& [name, history] : in_tracker_) {
     if (name == name_) continue;
-    const auto other = move_of(history, at);
+    const auto other = move_of(history, at, own->apart);
     if (!other) continue;
     const Transform<Tracker, Sensor> with_it = by * other->before;
     const double would_mm = (with_it.translation() - other->before.translation()).norm();
-    const double slack_mm = 1 + 0.35 * would_mm, slack_deg = 0.5 + 0.5 * turn_deg(by.rotation());
+    const double slack_mm = std::min(1 + 0.35 * would_mm, kMostSlackMm);
+    const double slack_deg = std::min(0.5 + 0.5 * turn_deg(by.rotation()), kMostSlackDeg);
     const auto is_near = [&](const Transform<Tracker, Sensor>& place) {
       return (other->after.translation() - place.translation()).norm() < slack_mm &&
              turn_deg(place.rotation().transpose() * other->after.rotation()) < slack_deg;

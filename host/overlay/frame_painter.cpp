@@ -34,12 +34,21 @@ PaintedStill paint_still(const Still& still, Engine& engine, const OverlayLook& 
 }
 
 void FramePainter::set_setup(std::optional<Setup> setup, const TrustFigures& figures) {
+  // How the noise throws the target about holds on for the same scope and target, seen from anywhere.
+  const auto place = [](const std::optional<Setup>& of, const TrustFigures& by) -> std::optional<Eigen::Vector3d> {
+    if (!of || !by.target_in_patient_mm) return std::nullopt;
+    return of->camera_from_patient(Transform<Tracker, Sensor>()) * *by.target_in_patient_mm;
+  };
+  const auto target_mm = place(setup, figures);
+  if (target_mm && target_mm != jitter_of_mm_) {
+    jitter_ = {};
+    single_poses_ = false;
+    jitter_of_mm_ = target_mm;
+  }
   setup_ = std::move(setup);
   figures_ = figures;
   gate_ = OverlayGate(settings_);
   gate_.set_figures(figures_);
-  jitter_ = {};
-  single_poses_ = false;
 }
 
 void FramePainter::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {

@@ -89,7 +89,8 @@ class FramePainter {
   OverlayGate::Settings settings_;
   OverlayGate gate_;
   TargetJitter jitter_;
-  bool single_poses_ = false;  ///< the jitter is of them, not of the frames' poses
+  std::optional<Eigen::Vector3d> jitter_of_mm_;  ///< where a sensor at the tracker's origin would have its target
+  bool single_poses_ = false;                    ///< the jitter is of them, not of the frames' poses
   std::optional<Setup> setup_;
   TrustFigures figures_;
   std::shared_ptr<const Margins> margins_;

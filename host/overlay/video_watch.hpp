@@ -46,6 +46,9 @@ class VideoWatch {
             motion_.contradicted() && differed};
   }
 
+  /// A frame that is not to be looked at: what agreed is in doubt until a later one agrees.
+  void look_away(DeviceTime acquired) { motion_.doubt(acquired); }
+
   /// The poses are in another frame from now on: from one to the next they would leap.
   void forget_motion() {
     motion_ = VideoMotion();

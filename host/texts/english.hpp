@@ -444,6 +444,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_no_ct", "the CT is not ready"},
     {"why_hidden", "it is switched off"},
     {"why_calibration_held", "the calibration is not used: {}"},
+    {"why_calibrating", "the scope is being calibrated over the board"},
     {"why_registration_held", "the registration is not used: {}"},
     {"why_other_size", "the video is {} x {} and the camera was calibrated at {} x {}"},
     {"why_unproven", "nothing tells whether {} is of the recording's {}"},

@@ -1,6 +1,9 @@
 // What brings a registration back that something has spoken against.
 #include <gtest/gtest.h>
 
+#include <array>
+
+#include "drivers/system/wait.hpp"
 #include "tests/support/live_operation.hpp"
 
 namespace birdseye::host {
@@ -26,14 +29,23 @@ class Doubted : public ::testing::Test {
     ASSERT_TRUE(drawn());
   }
   /// Without video for a while nobody knows what was moved.
-  void pause() {
+  void pause(std::int64_t until_ms = 20'000) {
     wire::VideoFrame frame;
-    for (const std::int64_t ms : {0, 20'000}) {
+    for (const std::int64_t ms : {until_ms - 20'000, until_ms}) {
       frame.info.acquired = DeviceTime{ms * birdseye::testing::kMs};
       workflow_.take(frame, HostTime{frame.info.acquired.ns}, ClockGap{});
     }
     ASSERT_FALSE(drawn());
     ASSERT_EQ(workflow_.view().step, LiveStep::check);
+  }
+  void pick_landmark(const Eigen::Vector3d& place_mm) {
+    const std::size_t before = workflow_.view().landmarks.size();
+    workflow_.pick(PlacePicks::Kind::landmark, place_mm);
+    for (int i = 0; i < 1000 && workflow_.view().landmarks.size() == before; ++i) {
+      sleep_for(Duration::from_ms(10));
+      workflow_.tick();
+    }
+    ASSERT_EQ(workflow_.view().landmarks.size(), before + 1);
   }
   bool drawn() { return workflow_.picture().setup().has_value(); }
   std::string said() { return workflow_.view().note(LiveStep::check).line; }
@@ -174,6 +186,70 @@ TEST_F(Doubted, IsNotARegistrationThatWasMadeWhileTheScopeWasAway) {
   ASSERT_TRUE(drawn());
   seen_at(60'000);
   EXPECT_TRUE(drawn()) << said();
+}
+
+TEST_F(Doubted, IsARegistrationWhoseScopeCameLongAfterIt) {
+  wire::Birds birds;
+  birds.birds.push_back({"scope", Transform<Tracker, Sensor>()});
+  check_at(workflow_, kTumour);
+  ASSERT_TRUE(drawn());
+  birds.acquired = DeviceTime{600'000 * birdseye::testing::kMs};
+  workflow_.take(birds, HostTime{birds.acquired.ns}, ClockGap{});
+  EXPECT_FALSE(drawn()) << "nobody has seen for ten minutes what was moved";
+}
+
+/// A landmark that is picked where the tip is shown fits whatever has moved.
+TEST_F(Doubted, IsNotConfirmedByLandmarksThatWerePickedSinceThoughOthersWereTakenBack) {
+  pick_landmark({20, 20, 10});
+  pick_landmark({40, 40, 10});
+  pause();
+  workflow_.undo();
+  workflow_.undo();
+  for (const Eigen::Vector3d& picked : {Eigen::Vector3d(-20, 20, 75), Eigen::Vector3d(40, -30, 75)}) {
+    pick_landmark(picked);
+    check_at(workflow_, picked);
+  }
+  EXPECT_FALSE(drawn()) << said();
+}
+
+TEST_F(Doubted, IsNotConfirmedByLandmarksThatWerePickedBeforeItWasDoubtedAgain) {
+  pause();
+  const std::array picked{Eigen::Vector3d(-20, 20, 75), Eigen::Vector3d(40, -30, 75)};
+  for (const Eigen::Vector3d& place : picked) pick_landmark(place);
+  pause(40'000);
+  for (const Eigen::Vector3d& place : picked) check_at(workflow_, place);
+  EXPECT_FALSE(drawn()) << said();
+}
+
+/// Touches that were held back and then doubted are gone, and hold nothing up any more.
+TEST_F(Doubted, AreTouchesThatWereHeldBackAndNothingIsHeldBackAfter) {
+  workflow_.go_to(LiveStep::fiducials);
+  while (workflow_.view().touches.size() > 2) workflow_.undo();
+  const auto show_frame = [&](std::int64_t ms) {
+    wire::VideoFrame frame;
+    frame.info.acquired = DeviceTime{ms * birdseye::testing::kMs};
+    workflow_.take(frame, HostTime{frame.info.acquired.ns}, ClockGap{});
+  };
+  const auto come_again = [&] {
+    workflow_.set_link(false, "gone");
+    workflow_.set_link(true, "again");
+    birdseye::testing::tell_health(workflow_);
+    birdseye::testing::give_record(workflow_);
+    workflow_.set_link(true, "again");
+  };
+  show_frame(0);
+  workflow_.set_link(false, "gone");
+  show_frame(20'000);
+  come_again();
+  EXPECT_TRUE(workflow_.view().touches.empty());
+  workflow_.go_to(LiveStep::fiducials);
+  Hand hand(workflow_);
+  for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_TRUE(drawn());
+  workflow_.go_to(LiveStep::run);
+  come_again();
+  EXPECT_EQ(workflow_.view().step, LiveStep::run);
 }
 
 TEST_F(Doubted, IsBegunAnewByThePedalInTheStepOfFiducials) {

@@ -151,6 +151,51 @@ TEST(ReferenceSensor, OneThatComesOffIsSeenWithin150ms) {
   }
 }
 
+/// As of a blow that moves both: the slip may not pass for part of the bump.
+TEST(ReferenceSensor, OneThatSlipsAsTheTransmitterIsBumpedIsSeen) {
+  Follower at;
+  at.follow(50);
+  const auto fixed = at.room.patient_from_reference;
+  at.follow(10, [&](double share) {
+    at.room.tracker_from_room =
+        by<Tracker, Tracker>(share * Eigen::Vector3d(0, 4, 3), share * Eigen::Vector3d(12, 14, -8));
+    at.room.patient_from_reference = fixed * by<Sensor, Sensor>({0, 2 * share, 2 * share}, {6 * share, 0, -5 * share});
+  });
+  at.follow(20);
+  EXPECT_EQ(at.news, std::vector{News::moved});
+}
+
+TEST(ReferenceSensor, OneThatSlipsWhileItsRecordsAreLostIsSeenHoweverLongTheHole) {
+  for (int hole = 1; hole <= 15; ++hole) {
+    for (const bool all : {false, true}) {
+      Follower at;
+      at.follow(50);
+      const auto fixed = at.room.patient_from_reference;
+      at.follow(hole, [&](double share) {
+        (all ? at.room.any_seen : at.room.reference_seen) = false;
+        at.room.patient_from_reference = fixed * by<Sensor, Sensor>({0, 8 * share, 0}, {14 * share, 0, 0});
+      });
+      at.room.any_seen = at.room.reference_seen = true;
+      at.follow(30);
+      EXPECT_FALSE(at.news.empty()) << 10 * hole << " ms" << (all ? ", all birds" : "");
+    }
+  }
+}
+
+TEST(ReferenceSensor, AHoleInItsRecordsAloneIsNoNews) {
+  for (int hole = 1; hole <= 9; ++hole) {
+    Follower at;
+    at.room.noise_mm = 0.5;
+    at.room.noise_deg = 0.1;
+    at.follow(100);
+    at.room.reference_seen = false;
+    at.follow(hole);
+    at.room.reference_seen = true;
+    at.follow(100);
+    EXPECT_TRUE(at.news.empty()) << 10 * hole << " ms";
+  }
+}
+
 TEST(ReferenceSensor, ATableThatTiltsAndNoiseAreNoNews) {
   Follower at;
   at.room.noise_mm = 0.7;

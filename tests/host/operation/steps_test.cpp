@@ -83,6 +83,28 @@ TEST(CalibrationStep, OfTwoCalibrationsTheNewerCounts) {
   EXPECT_EQ(CalibrationStep().adopt(record), CalibrationStep::Adopted::no);
 }
 
+/// The appliance tells that the scope was exchanged since the board was used.
+TEST(CalibrationStep, ARecordOfAnotherScopeCountsThoughTheBoardWasUsedLater) {
+  for (const bool record_first : {true, false}) {
+    CalibrationStep step;
+    auto record = example_record(768, 576, {}, {});
+    CalibratedScope board = kept_scope();
+    board.made_utc = "2026-11-22T09:50:00Z";
+    board.record_scope = "scope no. 17";
+    record.scope = record_first ? "scope no. 18" : "scope no. 17";
+    if (record_first) {
+      EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::again);
+      EXPECT_FALSE(step.take_up(board, "taken up"));
+    } else {
+      EXPECT_TRUE(step.take_up(board, "taken up"));
+      EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::no) << "it is of the same scope, and older";
+      record.scope = "scope no. 18";
+      EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::anew);
+    }
+    EXPECT_FALSE(step.found()->by_board);
+  }
+}
+
 TEST(CalibrationStep, GuidesOnlyOverABoard) {
   CalibrationStep step;
   step.begin("scope", std::nullopt);
@@ -243,6 +265,7 @@ TEST(FiducialStep, WhatIsTakenUpIsNotConfirmedAndDoesNotReplaceAFit) {
   EXPECT_TRUE(step.touches().empty());
   EXPECT_FALSE(step.confirmed());
   EXPECT_EQ(step.note().line, "taken up, FRE 0.30 mm");
+  EXPECT_FALSE(step.fits_poorly());
   step.confirm();
   EXPECT_TRUE(step.confirmed());
   FiducialStep fitted;
@@ -250,6 +273,9 @@ TEST(FiducialStep, WhatIsTakenUpIsNotConfirmedAndDoesNotReplaceAFit) {
   fitted.fit(kFiducials, 0, nullptr);
   EXPECT_FALSE(fitted.take_up(kept, "taken up"));
   EXPECT_TRUE(fitted.confirmed());
+  FiducialStep poor;
+  EXPECT_TRUE(poor.take_up(RegisteredPatient{kTrackerFromPatient, kGoodFit_mm + 0.1, kFiducials}, "taken up"));
+  EXPECT_TRUE(poor.fits_poorly()) << "as it was said when it was found";
 }
 
 TEST(PointerTip, TellsARestWhenItEndsAndAtOnceWhereItIsHeld) {

@@ -44,6 +44,30 @@ std::vector<std::uint8_t> painted(const TrustFigures& figures, const OverlayLook
   return paint_still({kVideo, camera_of(3, 1), {}}, engine, look, figures).rgb;
 }
 
+/// Where a check changes a figure, the circle must not forget the tracker's noise.
+TEST(FramePainter, KnowsTheNoiseOnWhereScopeAndTargetAreAsBefore) {
+  const ScopeSetup scope = ScopeSetup::of_hand_eye(camera_of(30, 30), 0.3, calibration::HandEyeResult());
+  const auto setup_at = [&](double x_mm) {
+    return scope.registered(Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), {x_mm, 0, 100}));
+  };
+  TrustFigures figures = kGoodFigures;
+  figures.target_in_patient_mm = Eigen::Vector3d(1, 2, 3);
+  FramePainter painter{OverlayGate::Settings()};
+  painter.set_setup(setup_at(0), figures);
+  for (int i = 0; i < 30; ++i)
+    painter.take(DeviceTime{i * 10'000'000},
+                 Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), {i % 2 * 1.0, 0, 0}));
+  ASSERT_TRUE(painter.jitter().rms_mm());
+  figures.target_mm = 3;
+  painter.set_setup(setup_at(0), figures);
+  EXPECT_TRUE(painter.jitter().rms_mm());
+  painter.set_setup(std::nullopt, {});
+  painter.set_setup(setup_at(0), figures);
+  EXPECT_TRUE(painter.jitter().rms_mm()) << "also after a moment in which nothing was drawn";
+  painter.set_setup(setup_at(5), figures);
+  EXPECT_FALSE(painter.jitter().rms_mm()) << "the patient was registered anew";
+}
+
 TEST(PaintStill, LeavesTheVideoWhereThereIsNoOverlayAndBlendsWhereThereIs) {
   EXPECT_EQ(painted(kGoodFigures), kOverlaid);
   OverlayLook look;
