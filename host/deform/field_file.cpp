@@ -3,7 +3,6 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "drivers/system/durable.hpp"
 #include "host/deform/displacement_field.hpp"
 #include "host/volume/image_file.hpp"
 
@@ -18,13 +17,7 @@ Result<void> write_field(const std::filesystem::path& path, const DisplacementFi
   image.axes = field.patient_from_lattice.linear().colwise().normalized();
   image.values.reserve(3 * field.displacement_mm.size());
   for (const Eigen::Vector3f& u : field.displacement_mm) image.values.insert(image.values.end(), u.begin(), u.end());
-  const std::filesystem::path part = path.parent_path() / fmt::format("part-{}", path.filename().string());
-  if (auto written = write_image(part, image, StoredAs::float32); !written) {
-    std::error_code ignored;
-    std::filesystem::remove(part, ignored);
-    return written;
-  }
-  return replace_durably(part, path);
+  return write_image(path, image, StoredAs::float32);
 }
 
 Result<void> check_sound(const DisplacementField& field) {

@@ -9,6 +9,10 @@
 #include <itkTransformFileWriter.h>
 #include <itkTxtTransformIO.h>
 
+#include <system_error>
+
+#include "drivers/system/durable.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -79,11 +83,12 @@ Eigen::Vector3d RestMap::operator()(const Eigen::Vector3d& seen_mm) const {
 Result<void> write_transform(const fs::path& path, const RestMap& map) {
   const auto io = io_for(path);
   if (io == nullptr) return refused(Errc::bad_value, path, "name it .tfm or .h5");
+  const fs::path part = path.parent_path() / fmt::format("part-{}", path.filename().string());
   try {
     const auto affine = affine_of(map.ct_from_seen);
     const auto writer = itk::TransformFileWriterTemplate<double>::New();
     writer->SetTransformIO(io);
-    writer->SetFileName(path.string());
+    writer->SetFileName(part.string());
     if (map.field == nullptr) {
       writer->SetInput(affine);
     } else {
@@ -94,9 +99,12 @@ Result<void> write_transform(const fs::path& path, const RestMap& map) {
       writer->SetInput(both);
     }
     writer->Update();
-    return {};
+    return replace_durably(part, path);
   } catch (const std::exception&) {
-    return refused(Errc::unreadable, path, "cannot be written; check the folder and its permissions");
+    std::error_code ignored;
+    fs::remove(part, ignored);
+    return refused(Errc::unreadable, path,
+                   "cannot be written; check the folder and its permissions, and whether the disk is full");
   }
 }
 

@@ -125,12 +125,13 @@ std::optional<fs::path> recording_at(const fs::path& path) {
   return is_one ? std::optional(folder) : std::nullopt;
 }
 
-Result<AdmittedRecording> admit_recording(const fs::path& path, const Authors& authors) {
+Result<AdmittedRecording> admit_recording(const fs::path& named, const Authors& authors) {
+  const auto recording = recording_at(named);
+  if (!recording) return AdmittedRecording();
+  const fs::path& path = *recording;
   if (is_appliance_recording(path)) return admit_appliance_recording(path, authors);
   std::error_code ignored;
   const bool sheet = fs::exists(path / kRecordingSheet, ignored);
-  if (!fs::is_directory(path, ignored) || (!sheet && !fs::exists(path / kRecordingEvents, ignored)))
-    return AdmittedRecording();
   RecordingSeal seal;
   if (sheet || !authors.accept_unsigned) {
     auto read = read_recording_seal(path);

@@ -40,7 +40,7 @@ struct AdmittedRecording {
 
 /// As Authors::admit(), with the recording's name: of a session recording, and of an appliance recording. Refuses also
 /// where a file was changed, is missing or was added, and bytes behind a signature. Anything else, as a sequence of
-/// PLUS, nobody signs: it is admitted.
+/// PLUS, nobody signs: it is admitted. A file of a session recording is admitted as that is.
 Result<AdmittedRecording> admit_recording(const std::filesystem::path& path, const Authors& authors);
 
 }  // namespace birdseye::host

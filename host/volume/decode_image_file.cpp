@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/system/durable.hpp"
 #include "drivers/system/process_copy.hpp"
 #include "host/confine/allowance.hpp"
 #include "host/volume/decode.hpp"
@@ -224,39 +225,61 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
   }
 }
 
+namespace {
+
+/// Writes it, and reads it again: the writers say nothing where the disk took less than it was given.
+template <typename Value>
+bool write_voxels(itk::ImageIOBase& io, itk::IOComponentEnum type, const std::vector<Value>& values) {
+  io.SetComponentType(type);
+  io.Write(values.data());
+  const fs::path path = io.GetFileName();
+  const itk::ImageIOBase::Pointer again = image_io(path, false);
+  if (again == nullptr) return false;
+  again->SetFileName(path.string());
+  again->ReadImageInformation();
+  const std::size_t bytes = values.size() * sizeof(Value);
+  if (again->GetComponentType() != type || static_cast<std::size_t>(again->GetImageSizeInBytes()) != bytes)
+    return false;
+  std::vector<char> read(bytes, kFilling);
+  return read_voxels(*again, read) && std::memcmp(read.data(), values.data(), bytes) == 0;
+}
+
+bool write_to(const fs::path& path, const ImageFile& image, StoredAs stored) {
+  const itk::ImageIOBase::Pointer io = image_io(path, true);
+  io->SetFileName(path.string());
+  io->SetNumberOfDimensions(3);
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    io->SetDimensions(axis, static_cast<itk::SizeValueType>(image.size[axis]));
+    io->SetSpacing(axis, image.spacing_mm[axis]);
+    io->SetOrigin(axis, image.origin_mm[axis]);
+    const Eigen::Vector3d direction = image.axes.col(axis);
+    io->SetDirection(axis, std::vector<double>(direction.begin(), direction.end()));
+  }
+  io->SetNumberOfComponents(static_cast<unsigned>(image.components));
+  io->SetPixelType(image.components == 1 ? itk::IOPixelEnum::SCALAR : itk::IOPixelEnum::VECTOR);
+  io->UseCompressionOn();
+  take_whole(*io);
+  if (stored == StoredAs::float32) return write_voxels(*io, itk::IOComponentEnum::FLOAT, image.values);
+  if (stored == StoredAs::int16) return write_voxels(*io, itk::IOComponentEnum::SHORT, image.hu);
+  return write_voxels(*io, itk::IOComponentEnum::UCHAR, std::vector<std::uint8_t>(image.hu.begin(), image.hu.end()));
+}
+
+}  // namespace
+
 Result<void> write_image(const fs::path& path, const ImageFile& image, StoredAs stored) {
   const CopiesHeldOff held;
-  const itk::ImageIOBase::Pointer io = image_io(path, true);
-  if (io == nullptr) return refused(Errc::bad_value, path, "name it .nii.gz, .nrrd or .mha");
+  if (image_io(path, true) == nullptr) return refused(Errc::bad_value, path, "name it .nii.gz, .nrrd or .mha");
+  const fs::path part = path.parent_path() / fmt::format("part-{}", path.filename().string());
+  std::string fault;
   try {
-    io->SetFileName(path.string());
-    io->SetNumberOfDimensions(3);
-    for (unsigned axis = 0; axis < 3; ++axis) {
-      io->SetDimensions(axis, static_cast<itk::SizeValueType>(image.size[axis]));
-      io->SetSpacing(axis, image.spacing_mm[axis]);
-      io->SetOrigin(axis, image.origin_mm[axis]);
-      const Eigen::Vector3d direction = image.axes.col(axis);
-      io->SetDirection(axis, std::vector<double>(direction.begin(), direction.end()));
-    }
-    io->SetNumberOfComponents(static_cast<unsigned>(image.components));
-    io->SetPixelType(image.components == 1 ? itk::IOPixelEnum::SCALAR : itk::IOPixelEnum::VECTOR);
-    io->UseCompressionOn();
-    take_whole(*io);
-    if (stored == StoredAs::float32) {
-      io->SetComponentType(itk::IOComponentEnum::FLOAT);
-      io->Write(image.values.data());
-    } else if (stored == StoredAs::int16) {
-      io->SetComponentType(itk::IOComponentEnum::SHORT);
-      io->Write(image.hu.data());
-    } else {
-      io->SetComponentType(itk::IOComponentEnum::UCHAR);
-      const std::vector<std::uint8_t> bytes(image.hu.begin(), image.hu.end());
-      io->Write(bytes.data());
-    }
-    return {};
+    if (!write_to(part, image, stored)) fault = "cannot be written whole; is the disk full?";
   } catch (const std::exception&) {
-    return refused(Errc::unreadable, path, "cannot be written; check the folder and its permissions");
+    fault = "cannot be written; check the folder and its permissions, and whether the disk is full";
   }
+  if (fault.empty()) return replace_durably(part, path);
+  std::error_code ignored;
+  fs::remove(part, ignored);
+  return refused(Errc::unreadable, path, fault);
 }
 
 }  // namespace birdseye::host

@@ -44,7 +44,8 @@ Result<ImageFile> read_image(const VolumeSource& source, int components, const s
 Result<ImageFile> read_labels_file(const std::filesystem::path& path, const std::stop_token& stop = {});
 
 enum class StoredAs { uint8, int16, float32 };
-/// Writes, compressed, what read_image reads back: .nii.gz, .nrrd or .mha.
+/// Writes, compressed, what read_image reads back: .nii.gz, .nrrd or .mha. Into its place comes only what is whole and
+/// on the disk, for it is read back first.
 Result<void> write_image(const std::filesystem::path& path, const ImageFile& image, StoredAs stored);
 
 }  // namespace birdseye::host

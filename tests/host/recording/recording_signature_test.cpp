@@ -54,6 +54,7 @@ TEST(RecordingSignature, OfThisMachineIsAdmittedAndCoversEachOfItsFiles) {
       (void)scratch.file(std::string("r/") + file, changed);
       const std::string why = refusal(scratch / "r", {own.machine, true});
       EXPECT_NE(why, "") << file << " " << at;
+      EXPECT_EQ(refusal(scratch / "r" / "video.igs.mha", {own.machine, true}), why) << "a file of it is named";
       if (std::string(file) != kRecordingSheet) {
         EXPECT_NE(why.find(file), std::string::npos) << why;
       }
