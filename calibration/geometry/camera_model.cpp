@@ -30,6 +30,19 @@ Result<void> check(const CameraModel& c) {
                    "camera: a parameter is beyond that of any lens (a millionth or a million); "
                    "calibrate again"};
   }
+  // Pixels are at most eight times as tall as wide, or as wide as tall (--pixel-aspect).
+  constexpr double kMostUnlike = 10;
+  if (c.fx_px > kMostUnlike * c.fy_px || c.fy_px > kMostUnlike * c.fx_px) {
+    return Error{Errc::bad_value, fmt::format("camera: focal lengths {}, {} px are more than {:g} times apart; mend "
+                                              "them, or calibrate again",
+                                              c.fx_px, c.fy_px, kMostUnlike)};
+  }
+  const auto is_far_outside = [](double px, int size_px) { return px < -0.5 * size_px || px > 1.5 * size_px; };
+  if (is_far_outside(c.cx_px, c.width_px) || is_far_outside(c.cy_px, c.height_px)) {
+    return Error{Errc::bad_value, fmt::format("camera: its centre {}, {} px is far outside its picture of {}x{} px; "
+                                              "mend them, or calibrate again",
+                                              c.cx_px, c.cy_px, c.width_px, c.height_px)};
+  }
   return {};
 }
 

@@ -26,7 +26,8 @@ struct CameraModel {
   static constexpr int kParameters = 9;
 };
 
-/// Refuses sizes or focal lengths that are not positive and numbers that are not finite.
+/// Refuses sizes or focal lengths that are not positive, numbers that are not finite, focal lengths too far apart for
+/// any pixels, and a centre (cx, cy) more than half a picture outside the picture.
 Result<void> check(const CameraModel& camera);
 
 /// Normalised, undistorted (x, y) -> normalised, distorted. jacobian: 2x2, d(distorted)/d(x, y).

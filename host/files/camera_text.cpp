@@ -5,7 +5,10 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <charconv>
 #include <opencv2/core.hpp>
+#include <optional>
+#include <set>
 #include <vector>
 
 #include "host/files/stored_matrix.hpp"
@@ -52,20 +55,65 @@ Result<void> set_distortion(const Numbers& terms, CameraModel& camera) {
   return {};
 }
 
+/// Without them a lens that bends would be taken for one that does not.
+Error lacks_distortion(const char* key) {
+  return {Errc::bad_format,
+          fmt::format("lacks {}; write the lens again with it, or with zeros where the lens has no distortion", key)};
+}
+
+/// Of such a key one reader takes the first value, another the last.
+Error stands_twice(const std::string& key) {
+  return {Errc::bad_format, fmt::format("has {} twice; take out the one that is not meant", key)};
+}
+
 Error unknown_model(const char* key, const std::string& model) {
   return {Errc::unsupported, fmt::format("{} {} cannot be said by a lens here{}", key, model, kAnotherModel)};
 }
 
+/// A whole number that fits no int: OpenCV reads another in its place. Empty where there is none.
+std::string beyond_int(const std::string& text) {
+  constexpr const char* kBetween = " \t\r\n,:[]{}<>";
+  std::size_t end = 0;
+  for (std::size_t at = 0; (at = text.find_first_not_of(kBetween, end)) != std::string::npos;) {
+    end = std::min(text.find_first_of(kBetween, at), text.size());
+    int value = 0;
+    const char* const first = text.data() + at + (text[at] == '+' ? 1 : 0);
+    const auto [rest, failed] = std::from_chars(first, text.data() + end, value);
+    if (failed == std::errc::result_out_of_range && rest == text.data() + end) return text.substr(at, end - at);
+  }
+  return {};
+}
+
+/// A key that stands twice in the map, or in one of the maps right in it. Empty where there is none.
+std::string twice_in(const cv::FileNode& map, int deeper = 1) {
+  if (!map.isMap()) return {};
+  std::set<std::string> keys;
+  for (const cv::FileNode item : map) {
+    if (!keys.insert(item.name()).second) return item.name();
+    if (deeper == 0) continue;
+    if (std::string twice = twice_in(item, deeper - 1); !twice.empty()) return twice;
+  }
+  return {};
+}
+
 Result<CameraModel> opencv_camera(const std::string& text) {
+  if (const std::string number = beyond_int(text); !number.empty()) {
+    return Error{Errc::bad_value,
+                 fmt::format("has the whole number {}, which OpenCV takes for another; mend it, or put it in quotes "
+                             "where it is a name",
+                             number.substr(0, 40))};
+  }
   CameraModel camera;
   cv::Mat matrix, distortion;
   try {
     const cv::FileStorage file(text, kInMemory);
+    if (const std::string twice = twice_in(file.root()); !twice.empty()) return stands_twice(twice);
     if (!file["image_width"].isInt() || !file["image_height"].isInt())
       return Error{Errc::bad_format, "lacks image_width and image_height; add the size the lens was calibrated at"};
     camera.width_px = static_cast<int>(file["image_width"]);
     camera.height_px = static_cast<int>(file["image_height"]);
     matrix = stored_matrix(file["camera_matrix"]);
+    if (file["distortion_coefficients"].empty()) return lacks_distortion("distortion_coefficients");
     distortion = stored_matrix(file["distortion_coefficients"]);
   } catch (const cv::Exception&) {
     return Error{Errc::bad_format, "is no camera file in OpenCV's YAML"};
@@ -76,14 +124,14 @@ Result<CameraModel> opencv_camera(const std::string& text) {
   return camera;
 }
 
-/// Numbers under the first of the keys that is there; of a matrix, its data.
-Numbers numbers_under(const YAML::Node& node, std::initializer_list<const char*> keys) {
+/// Numbers under the first of the keys that is there; of a matrix, its data. Nothing where none is there.
+std::optional<Numbers> numbers_under(const YAML::Node& node, std::initializer_list<const char*> keys) {
   for (const char* key : keys) {
     const YAML::Node found = node[key];
     if (!found) continue;
     return (found.IsMap() ? found["data"] : found).as<Numbers>();
   }
-  return {};
+  return std::nullopt;
 }
 
 Result<CameraModel> ros_camera(const YAML::Node& node) {
@@ -94,7 +142,8 @@ Result<CameraModel> ros_camera(const YAML::Node& node) {
     return Error{Errc::bad_format, "lacks image_width and image_height; add the size the lens was calibrated at"};
   camera.width_px = width.as<int>();
   camera.height_px = height.as<int>();
-  const auto model = node["distortion_model"] ? node["distortion_model"].as<std::string>() : std::string("plumb_bob");
+  if (!node["distortion_model"]) return lacks_distortion("distortion_model");
+  const auto model = node["distortion_model"].as<std::string>();
   if (model != "plumb_bob" && model != "rational_polynomial" && !model.empty())
     return unknown_model("its distortion_model", model);
   for (const char* binning : {"binning_x", "binning_y"}) {
@@ -116,18 +165,21 @@ Result<CameraModel> ros_camera(const YAML::Node& node) {
                       wide, high, x, y, x, y)};
     }
   }
-  if (const auto sound = set_matrix(numbers_under(node, {"camera_matrix", "K", "k"}), camera); !sound)
-    return sound.error();
-  if (const auto sound = set_distortion(numbers_under(node, {"distortion_coefficients", "D", "d"}), camera); !sound)
-    return sound.error();
+  const auto matrix = numbers_under(node, {"camera_matrix", "K", "k"});
+  if (const auto sound = set_matrix(matrix.value_or(Numbers()), camera); !sound) return sound.error();
+  const auto distortion = numbers_under(node, {"distortion_coefficients", "D", "d"});
+  if (!distortion) return lacks_distortion("distortion_coefficients");
+  if (const auto sound = set_distortion(*distortion, camera); !sound) return sound.error();
   return camera;
 }
 
 Result<CameraModel> kalibr_camera(const YAML::Node& node) {
   const auto model = node["camera_model"].as<std::string>();
   if (model != "pinhole") return unknown_model("its camera_model", model);
-  const auto distortion = node["distortion_model"] ? node["distortion_model"].as<std::string>() : std::string("none");
+  if (!node["distortion_model"]) return lacks_distortion("distortion_model");
+  const auto distortion = node["distortion_model"].as<std::string>();
   if (distortion != "radtan" && distortion != "none") return unknown_model("its distortion_model", distortion);
+  if (distortion == "radtan" && !node["distortion_coeffs"]) return lacks_distortion("distortion_coeffs");
   const auto size = node["resolution"].as<std::vector<int>>();
   const Numbers f = node["intrinsics"].as<Numbers>();
   const Numbers d = distortion == "none" ? Numbers{} : node["distortion_coeffs"].as<Numbers>();
@@ -166,11 +218,26 @@ std::string only_related(const YAML::Node& root) {
   return names.size() == 1 ? names.front() : std::string();
 }
 
+/// A key that stands twice in the map, or in one of the maps right in it. Empty where there is none.
+std::string twice_in(const YAML::Node& map, int deeper = 1) {
+  if (!map.IsMap()) return {};
+  std::set<std::string> keys;
+  for (const auto& item : map) {
+    const auto key = item.first.as<std::string>();
+    if (!keys.insert(key).second) return key;
+    if (deeper == 0) continue;
+    if (std::string twice = twice_in(item.second, deeper - 1); !twice.empty()) return twice;
+  }
+  return {};
+}
+
 /// The text as plain YAML; what parse makes of it may throw what yaml-cpp throws.
 template <typename Parse>
 auto of_yaml(const std::string& text, const Parse& parse) -> decltype(parse(YAML::Node())) {
   try {
-    return parse(YAML::Load(text));
+    const YAML::Node root = YAML::Load(text);
+    if (const std::string twice = twice_in(root); !twice.empty()) return stands_twice(twice);
+    return parse(root);
   } catch (const YAML::Exception& error) {
     return Error{Errc::bad_format, fmt::format("is no camera file of OpenCV, ROS or Kalibr: {}", error.what())};
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <utility>
 
 #include "calibration/record/calibration_record.hpp"
@@ -20,6 +21,9 @@ inline calibration::CalibrationRecord example_record(int width_px, int height_px
   LensEntry lens;
   lens.provenance = provenance;
   lens.camera = {width_px, height_px, 608.671795, 606.1 / 3, 323.1, 231.3, -0.43, 0.24, 1e-4, -2e-5, 0.1};
+  // In the picture, however small it is.
+  lens.camera.cx_px = std::min(lens.camera.cx_px, static_cast<double>(width_px));
+  lens.camera.cy_px = std::min(lens.camera.cy_px, static_cast<double>(height_px));
   lens.model = "radial3_tangential2";
   const Eigen::Matrix<double, 9, 1> sigma = Eigen::Matrix<double, 9, 1>::LinSpaced(0.1, 0.9);
   lens.covariance = sigma * sigma.transpose() / 3;

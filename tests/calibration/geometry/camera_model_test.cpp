@@ -110,6 +110,20 @@ TEST(CameraModel, RefusesWhatIsNoCamera) {
   EXPECT_FALSE(check(c));
 }
 
+TEST(CameraModel, RefusesFocalLengthsAndACentreThatNoLensHas) {
+  const auto error_of = [](double fx_px, double fy_px, double cx_px, double cy_px) {
+    const auto checked = check(CameraModel{640, 480, fx_px, fy_px, cx_px, cy_px});
+    return checked ? "" : checked.error().what;
+  };
+  EXPECT_EQ(error_of(600, 75, 322, 237), "") << "--pixel-aspect 1:8";
+  EXPECT_EQ(error_of(600, 4800, 322, 237), "") << "--pixel-aspect 8";
+  EXPECT_NE(error_of(600, 7, 322, 237).find("focal lengths 600, 7 px are more than 10 times apart"), std::string::npos);
+  EXPECT_NE(error_of(7, 600, 322, 237).find("focal lengths 7, 600 px are more than 10 times apart"), std::string::npos);
+  EXPECT_EQ(error_of(600, 600, -320, 720), "");
+  for (const auto& [cx_px, cy_px] : {std::pair(-321.0, 237.0), {961.0, 237.0}, {322.0, -241.0}, {322.0, 721.0}})
+    EXPECT_NE(error_of(600, 600, cx_px, cy_px).find("is far outside its picture of 640x480 px"), std::string::npos);
+}
+
 TEST(CameraModel, LiverSurfaceProjectsAsItsReadmeSays) {
   const auto data = testing::data_dir();
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";

@@ -129,10 +129,66 @@ TEST(CameraFiles, FilesOfOtherProgramsProjectAsOpenCvDoes) {
   }
 }
 
+std::string changed(std::string text, const std::string& what, const std::string& by) {
+  return text.replace(text.find(what), what.size(), by);
+}
+
+TEST(CameraFiles, ALensWithoutItsDistortionIsRefusedByTheKeyThatIsMissing) {
+  const std::string opencv = camera_text(kLens);
+  const std::string model = "distortion_model: plumb_bob\r\n";
+  for (const auto& [text, key] :
+       {std::pair{opencv.substr(0, opencv.find("distortion_coefficients")), "lacks distortion_coefficients;"},
+        {kRos.substr(0, kRos.find("distortion_coefficients")), "lacks distortion_coefficients;"},
+        {changed(kRos, model, ""), "lacks distortion_model;"},
+        {changed(kChain, "  distortion_model: radtan\n", ""), "lacks distortion_model;"},
+        {changed(kChain, "distortion_coeffs", "distortion"), "lacks distortion_coeffs;"}}) {
+    const auto camera = read_lens_text(text);
+    ASSERT_FALSE(camera) << text;
+    EXPECT_THAT(camera.error().what, HasSubstr(key));
+    EXPECT_THAT(camera.error().what, HasSubstr("lens.yaml: "));
+  }
+  const std::string terms = "[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05";
+  for (const std::string& text :
+       {changed(kChain, "radtan", "none"), changed(kRos, terms + ", 0]", "[]"), changed(kRos, terms, "[0, 0, 0, 0"),
+        changed(kMessage, terms + ", 0.0, 0.0, 0.0, 0.0]", "[]")}) {
+    const auto camera = read_lens_text(text);
+    ASSERT_TRUE(camera) << camera.error().what;
+    EXPECT_EQ(camera->k1, 0);
+    EXPECT_EQ(camera->fx_px, 458.654);
+  }
+}
+
+TEST(CameraFiles, AKeyThatStandsTwiceIsRefused) {
+  const std::string matrix = "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n";
+  const std::string xml =
+      "<?xml version=\"1.0\"?>\n<opencv_storage>\n<image_width>640</image_width>\n<image_width>320</image_width>\n"
+      "<image_height>480</image_height>\n</opencv_storage>\n";
+  for (const auto& [text, key] :
+       {std::pair{camera_text(kLens) + matrix + "   data: [ 900., 0., 9., 0., 900., 9., 0., 0., 1. ]\n",
+                  "camera_matrix"},
+        {changed(camera_text(kLens), "   rows: 3\n", "   rows: 3\n   rows: 9\n"), "rows"},
+        {xml, "image_width"},
+        {kRos + "camera_matrix:\n  data: [900, 0, 9, 0, 900, 9, 0, 0, 1]\n", "camera_matrix"},
+        {kChain + "  distortion_model: none\n", "distortion_model"},
+        {kChain + kChain, "cam0"}}) {
+    const auto camera = read_lens_text(text);
+    ASSERT_FALSE(camera) << text;
+    EXPECT_THAT(camera.error().what, HasSubstr("lens.yaml: has " + std::string(key) + " twice;"));
+  }
+}
+
+TEST(CameraFiles, AWholeNumberThatOpenCvTakesForAnotherIsRefused) {
+  const std::string text = changed(camera_text(kLens), "540.75", "18446744073709551615");
+  const auto camera = read_lens_text(text);
+  ASSERT_FALSE(camera);
+  EXPECT_THAT(camera.error().what, HasSubstr("lens.yaml: has the whole number 18446744073709551615"));
+  const auto wide = read_lens_text(changed(camera_text(kLens), "image_width: 1920", "image_width: 4294969216"));
+  ASSERT_FALSE(wide);
+  EXPECT_THAT(wide.error().what, HasSubstr("has the whole number 4294969216"));
+  EXPECT_EQ(*read_lens_text(camera_text(kLens) + "serial: \"41234567890123\"\nmade: 1700000000\n"), kLens);
+}
+
 TEST(CameraFiles, WhatCannotBeSaidIsRefusedByName) {
-  const auto changed = [](std::string text, const std::string& what, const std::string& by) {
-    return text.replace(text.find(what), what.size(), by);
-  };
   for (const auto& [text, words] :
        {std::pair{changed(kChain, "radtan", "equidistant"), "its distortion_model equidistant cannot be said"},
         {changed(kChain, "pinhole", "omni"), "its camera_model omni cannot be said"},
