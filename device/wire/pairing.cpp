@@ -168,10 +168,8 @@ Result<void> write_text(const std::filesystem::path& path, const std::string& te
 /// what it calls itself, with a number behind it where another machine has that name.
 Result<std::string> name_for(const Introduction& introduction, const PairingPlan& plan, const KnownKeys& known) {
   if (auto has = known.name_of(introduction.key)) return *std::move(has);
-  if (plan.name.empty()) return known.free_name(introduction.name == kOwn ? "the-other" : introduction.name);
-  if (plan.name.find('/') != std::string::npos) return Error{Errc::bad_value, "a machine's name has no \"/\" in it"};
-  if (plan.name == kOwn)
-    return Error{Errc::bad_value, fmt::format("the other machine cannot be called {}: give it another --name", kOwn)};
+  if (plan.name.empty())
+    return known.free_name(KnownKeys::is_name(introduction.name) ? introduction.name : "the-other");
   if (const std::string why = known.objection({plan.name, introduction.key}); !why.empty())
     return Error{Errc::bad_value, why};
   return plan.name;

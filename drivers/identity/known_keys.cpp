@@ -17,19 +17,19 @@ namespace birdseye {
 
 namespace fs = std::filesystem;
 
-namespace {
-
-bool is_word(std::string_view name) {
-  return !name.empty() && name.size() <= 255 && name.front() != '#' &&
+bool KnownKeys::is_name(std::string_view name) {
+  return !name.empty() && name.size() <= 255 && name.front() != '#' && name != "own" && name != "." && name != ".." &&
          std::none_of(name.begin(), name.end(),
-                      [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == 127; });
+                      [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == 127 || c == '/'; });
 }
 
-}  // namespace
-
 std::string KnownKeys::objection(const Machine& machine) const {
-  if (!is_word(machine.name))
-    return fmt::format("\"{}\" is no name of a machine: give one word without spaces", machine.name);
+  if (!is_name(machine.name)) {
+    return fmt::format(
+        "\"{}\" is no name of a machine: give one word without spaces, # before it or / in it, and not "
+        "\"own\", \".\" or \"..\"",
+        machine.name);
+  }
   for (const Machine& known : machines_) {
     if (known.name == machine.name && known.key != machine.key)
       return fmt::format("another key has the name {} already: give another name, as {}", machine.name,

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "calibration/base/result.hpp"
@@ -28,9 +29,12 @@ class KnownKeys {
 
   /// The name of the machine with this key; nothing where it is unknown.
   [[nodiscard]] std::optional<std::string> name_of(const PublicKey& key) const;
-  /// Also into the file, and onto the disk. A key that is known stays with its name. Refuses a name that is no single
-  /// word, and one that another key has.
+  /// Also into the file, and onto the disk. A key that is known stays with its name. Refuses what is_name() does
+  /// not take, and a name that another key has.
   Result<void> add(const std::string& name, const PublicKey& key);
+  /// Whether another machine may have it: it is one word, and the name of a file (pairing keeps NAME.crt) other than
+  /// this machine's own.
+  [[nodiscard]] static bool is_name(std::string_view name);
   /// The name, or where a machine has it already the first of NAME-2, NAME-3 that none has.
   [[nodiscard]] std::string free_name(const std::string& name) const;
   /// Why add() would refuse the machine; empty where it would not.

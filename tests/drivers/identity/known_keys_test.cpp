@@ -72,8 +72,11 @@ TEST(KnownKeys, AddsNoKeyTwiceNoNameOfAnotherKeyAndNoNameThatIsNoWord) {
     ASSERT_FALSE(added);
     EXPECT_NE(added.error().what.find("another key has the name"), std::string::npos) << added.error().what;
   }
-  for (const char* name : {"", "two words", "line\nbreak", "#remark"})
-    EXPECT_FALSE(known->add(name, key_of(4))) << name;
+  for (const char* name : {"", "two words", "line\nbreak", "#remark", "own", ".", "..", "../cart", "cart/1"}) {
+    const auto added = known->add(name, key_of(4));
+    ASSERT_FALSE(added) << name;
+    EXPECT_NE(added.error().what.find("is no name of a machine: give one word"), std::string::npos) << name;
+  }
   EXPECT_EQ(testing::contents_of(folder / "known"), "cart-1 " + key_of(2).hex() + "\n");
 }
 
@@ -85,6 +88,16 @@ TEST(KnownKeys, RefusesADamagedLineByItsNumber) {
     (void)folder.file("known", "# carts\n" + line + "\ncart-2 " + key_of(3).hex() + "\n");
     fs::permissions(folder / "known", fs::perms::owner_read | fs::perms::owner_write);
     EXPECT_NE(error_of(folder).find("known: line 2: "), std::string::npos) << line << ": " << error_of(folder);
+  }
+}
+
+TEST(KnownKeys, RefusesALineWhoseNameNoOtherMachineMayHave) {
+  for (const char* name : {"own", "..", "../cart"}) {
+    const Scratch folder;
+    (void)folder.file("known", std::string(name) + " " + key_of(2).hex() + "\n");
+    fs::permissions(folder / "known", fs::perms::owner_read | fs::perms::owner_write);
+    EXPECT_NE(error_of(folder).find("known: line 1: \"" + std::string(name) + "\" is no name"), std::string::npos)
+        << error_of(folder);
   }
 }
 

@@ -117,6 +117,11 @@ TEST(VerifyCommand, MakesAMachineKnownByWhatItSigned) {
   expect("--trust theatre-3 " + path, 0, {"signed by theatre-3 ("}, elsewhere);
   expect(path, 0, {"signed by theatre-3 ("}, elsewhere);
   expect("--key", 0, {"fingerprint "}, elsewhere);
+  for (const char* name : {"own", "..", "a/b"}) {
+    testing::expect_refused("birdseye", std::string("verify --trust ") + name + " " + path,
+                            {"--trust: \"" + std::string(name) + "\" is no name of a machine"}, "",
+                            "env BIRDSEYE_IDENTITY=" + (scratch / "third").string());
+  }
   // Nobody becomes known by what is not signed, or not as it was.
   expect("--trust nobody " + scratch.file("unsigned.json", calibration::record_text(record())), 3, {"not signed"},
          elsewhere);
