@@ -1,5 +1,8 @@
 #include "drivers/identity/identity_folder.hpp"
 
+#include <fmt/format.h>
+#include <unistd.h>
+
 #include <cstdlib>
 #include <string>
 
@@ -26,6 +29,15 @@ Result<std::filesystem::path> identity_folder() {
     return fs::path(home) / ".config" / "birdseye" / "identity";
   return Error{Errc::not_found,
                "there is no folder for this machine's key: HOME is not set; set BIRDSEYE_IDENTITY to a folder"};
+}
+
+Result<void> check_owner(const std::filesystem::path& path, const struct stat& status) {
+  const uid_t user = ::geteuid();
+  if (status.st_uid == user || status.st_uid == 0) return {};
+  return Error{Errc::bad_value,
+               fmt::format("{}: belongs to another user ({}), who may change the keys: start this as that user, or "
+                           "look whether what is in it is yours and chown {} {}",
+                           path.string(), status.st_uid, user, path.string())};
 }
 
 }  // namespace birdseye

@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "drivers/identity/identity_folder.hpp"
 #include "drivers/system/durable.hpp"
 #include "drivers/system/whole_file.hpp"
 
@@ -55,7 +56,11 @@ Result<KnownKeys> KnownKeys::read(const fs::path& folder, const std::optional<Ma
   std::error_code ignored;
   if (!fs::exists(out.file_, ignored)) return with_own();
   struct stat status {};
-  if (::stat(out.file_.c_str(), &status) == 0 && (status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
+  const bool there = ::stat(out.file_.c_str(), &status) == 0;
+  if (there) {
+    if (const auto checked = check_owner(out.file_, status); !checked) return checked.error();
+  }
+  if (there && (status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
     return Error{Errc::bad_value, fmt::format("{}: others than its owner may say in it which machines are known: chmod "
                                               "644 {}, and look whether each line is yours",
                                               out.file_.string(), out.file_.string())};

@@ -22,7 +22,7 @@ class KnownKeys {
 
   /// Of the folder, where there may be no such file. own: this machine's key, or nothing where it has none yet; where a
   /// line has its name already, it is called as free_name() says. Refuses a line that is damaged, by its number, and a
-  /// file that others may change.
+  /// file that others may change, or that belongs to another user than this one or root.
   static Result<KnownKeys> read(const std::filesystem::path& folder, const std::optional<Machine>& own);
   /// This machine alone, and no file: none can be added.
   static KnownKeys of_own(const Machine& own);

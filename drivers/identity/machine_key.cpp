@@ -18,6 +18,7 @@
 #include <new>
 #include <system_error>
 
+#include "drivers/identity/identity_folder.hpp"
 #include "drivers/system/durable.hpp"
 #include "drivers/system/unique_fd.hpp"
 #include "drivers/system/whole_file.hpp"
@@ -51,6 +52,7 @@ Result<void> own_folder(const fs::path& folder) {
   }
   struct stat status {};
   if (::stat(folder.c_str(), &status) != 0) return cannot(folder, "cannot be read");
+  if (auto checked = check_owner(folder, status); !checked) return checked;
   if ((status.st_mode & (S_IWGRP | S_IWOTH)) == 0) return {};
   return Error{Errc::bad_value, fmt::format("{}: others than its owner may change the keys in it: chmod 700 {}",
                                             folder.string(), folder.string())};
@@ -112,6 +114,7 @@ Result<std::shared_ptr<EVP_PKEY>> read_key(const fs::path& file) {
   if (!fd) return fd.error();
   struct stat status {};
   if (::fstat(fd->get(), &status) != 0) return cannot(file, "cannot be read");
+  if (const auto checked = check_owner(file, status); !checked) return checked.error();
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
     return Error{
         Errc::bad_value,

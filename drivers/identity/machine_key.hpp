@@ -18,7 +18,7 @@ namespace birdseye {
 class MachineKey {
  public:
   /// Of the folder, and made there where there is none: of two programs that make it at once both get the same. Refused
-  /// where anybody else may read the key or change the folder.
+  /// where anybody else but root may read the key or change the folder, or one of them belongs to another.
   static Result<MachineKey> open(const std::filesystem::path& folder);
   /// One that is kept nowhere, and has no file.
   static MachineKey for_once();

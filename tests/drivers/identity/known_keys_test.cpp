@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "tests/support/scratch.hpp"
 #include "tests/support/synced_files.hpp"
@@ -133,6 +134,15 @@ TEST(KnownKeys, RefusesAFileThatOthersMayChange) {
   }
   fs::permissions(folder / "known", fs::perms::owner_read | fs::perms::owner_write | fs::perms::others_read);
   EXPECT_EQ(error_of(folder), "");
+}
+
+TEST(KnownKeys, RefusesAFileOfAnotherUser) {
+  const Scratch folder;
+  const std::string path = folder.file("known", "cart-1 " + key_of(2).hex() + "\n");
+  fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write);
+  if (::chown(path.c_str(), 12345, static_cast<gid_t>(-1)) != 0) GTEST_SKIP() << "only root gives files away";
+  EXPECT_NE(error_of(folder).find("known: belongs to another user (12345)"), std::string::npos) << error_of(folder);
+  EXPECT_NE(error_of(folder).find("chown 0 " + path), std::string::npos) << error_of(folder);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <openssl/evp.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 #include <optional>
 #include <thread>
@@ -123,6 +124,18 @@ TEST(MachineKey, IsRefusedWhereOthersMayReadItOrChangeItsFolder) {
   for (const fs::perms more : {fs::perms::group_write, fs::perms::others_write}) {
     fs::permissions(scratch.path(), fs::perms::owner_all | more);
     EXPECT_NE(error_of(scratch.path()).find("chmod 700 " + scratch.path().string()), std::string::npos);
+  }
+}
+
+TEST(MachineKey, IsRefusedWhereItOrItsFolderIsAnotherUsers) {
+  for (const char* name : {"key.pem", ""}) {
+    const Scratch scratch;
+    ASSERT_TRUE(MachineKey::open(scratch.path()));
+    const fs::path path = *name != '\0' ? scratch / name : scratch.path();
+    if (::chown(path.c_str(), 12345, static_cast<gid_t>(-1)) != 0) GTEST_SKIP() << "only root gives files away";
+    const std::string error = error_of(scratch.path());
+    EXPECT_EQ(error.find(path.string() + ": belongs to another user (12345)"), 0U) << error;
+    EXPECT_NE(error.find("chown 0 " + path.string()), std::string::npos) << error;
   }
 }
 
