@@ -192,8 +192,7 @@ class TableOfPoints {
       auto columns = columns_of(row.fields);
       if (!columns) return columns.error();
       columns_ = *std::move(columns);
-      if (columns_->frame != StatedFrame::none) out_.frame = columns_->frame;
-      return {};
+      return columns_->frame != StatedFrame::none ? state(columns_->frame) : Result<void>();
     }
     if (first) counted_ = is_counted(row.fields);
     std::string count;
@@ -217,14 +216,23 @@ class TableOfPoints {
   [[nodiscard]] StatedPoints finish() && { return std::move(out_); }
 
  private:
+  Result<void> state(StatedFrame frame) {
+    if (out_.frame != StatedFrame::none && out_.frame != frame) {
+      return Error{Errc::bad_format,
+                   "the CoordinateSystem, or the columns l p s or r a s, say both LPS and RAS; take out what is wrong"};
+    }
+    out_.frame = frame;
+    return {};
+  }
+
   Result<void> take_remark(Fields fields) {
     if (fields.empty()) return {};
     std::string line;
     for (const std::string& field : fields) line += (line.empty() ? "" : " ") + field;
     fcsv_ = fcsv_ || lower_case(line).starts_with("markups fiducial file");
     if (const auto frame = value_of(line, "coordinatesystem")) {
-      out_.frame = frame_of_word(*frame);
-      if (out_.frame != StatedFrame::none) return {};
+      const StatedFrame stated = frame_of_word(*frame);
+      if (stated != StatedFrame::none) return state(stated);
       return Error{Errc::bad_format,
                    fmt::format("CoordinateSystem is \"{}\": save the points in LPS or RAS", frame->substr(0, 40))};
     }

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "calibration/base/lower_case.hpp"
+#include "calibration/record/strict_json.hpp"
 #include "drivers/system/whole_file.hpp"
 #include "host/files/pose_collector.hpp"
 
@@ -85,7 +86,10 @@ Result<StatedPoints> read_slicer_markups(const fs::path& path) {
     return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), why)};
   };
   try {
-    const nlohmann::json json = nlohmann::json::parse(*text);
+    std::string twice;
+    const auto json = calibration::strict_json<nlohmann::json>(*text, &twice);
+    if (!twice.empty())
+      return wrong(fmt::format("\"{}\" stands twice in it; take out the one that is not meant", twice));
     const nlohmann::json& markups = json.at("markups");
     if (!markups.is_array() || markups.size() != 1)
       return wrong(fmt::format("holds {} lists of points; save the one that is meant", markups.size()));

@@ -58,5 +58,14 @@ TEST(StrictJson, ARecordThatOthersReadOtherwiseIsNone) {
   EXPECT_FALSE(parse_signed_record(text.substr(0, format) + "\"format\": \"another\", " + text.substr(format)));
 }
 
+TEST(StrictJson, TellsWhichNameStandsTwice) {
+  std::string twice;
+  EXPECT_TRUE(strict_json<nlohmann::json>(R"({"a": {"b": 1, "b": 1}})", &twice).is_discarded());
+  EXPECT_EQ(twice, "b");
+  std::string none;
+  EXPECT_FALSE(strict_json<nlohmann::json>(R"({"a": {"b": 1}, "b": 1})", &none).is_discarded());
+  EXPECT_EQ(none, "");
+}
+
 }  // namespace
 }  // namespace birdseye::calibration

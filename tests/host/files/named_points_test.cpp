@@ -66,6 +66,13 @@ TEST(NamedPoints, AStatedFrameIsTurnedIntoTheOneThatIsAskedFor) {
   EXPECT_NE(told->notes[0].find("are in RAS, and are turned to LPS"), std::string::npos);
 }
 
+TEST(NamedPoints, AFrameThatIsSaidTwiceAlikeIsOne) {
+  const testing::Scratch scratch;
+  const auto read = read_points(scratch.file("a.fcsv", "# CoordinateSystem = 0\n" + kFcsv), PointsOf::patient);
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ((*read)[0], Eigen::Vector3d(1.5, 2, 3));
+}
+
 TEST(NamedPoints, PointsWithoutAPlaceYetArePassedOver) {
   const testing::Scratch scratch;
   const auto read = read_named_points(scratch.file("a.mrk.json", markups("LPS", "mm", "undefined")), PointsOf::patient);
@@ -102,6 +109,11 @@ TEST(NamedPoints, WhatIsNoListOfPointsIsRefusedWithTheRemedy) {
       {"frameless.fcsv", "# Markups fiducial file version = 4.11\n# columns = id,x,y,z\n1,2,3,4\n",
        "CoordinateSystem = LPS"},
       {"ijk.fcsv", "# CoordinateSystem = IJK\n1 2 3\n", "save the points in LPS or RAS"},
+      {"both.fcsv", "# CoordinateSystem = LPS\n# CoordinateSystem = RAS\n1 2 3\n", "line 2: the CoordinateSystem"},
+      {"both.csv", "# CoordinateSystem = LPS\nlabel,r,a,s\na,1,2,3\n", "say both LPS and RAS"},
+      {"both.mrk.json", markups("RAS\", \"coordinateSystem\": \"LPS"), "\"coordinateSystem\" stands twice"},
+      {"again.mrk.json", markups("LPS", "mm", "defined\", \"positionStatus\": \"defined"),
+       "\"positionStatus\" stands twice"},
       {"metres.mrk.json", markups("LPS", "m"), "\"coordinateUnits\" is not mm"},
       {"ijk.mrk.json", markups("IJK"), "neither LPS nor RAS"},
       {"other.json", "{\"a\": 1}", "is no list of points as 3D Slicer saves it"},
