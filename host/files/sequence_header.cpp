@@ -68,6 +68,7 @@ Result<SequenceHeader> read_sequence_header(const fs::path& path) {
       break;
     }
   }
+  if (in.bad()) return Error{Errc::unreadable, fmt::format("{}: {}", path.string(), kNotReadToItsEnd)};
   return header;
 }
 

@@ -31,8 +31,8 @@ struct SequenceHeader {
   std::uint64_t data_offset = 0;         ///< where in the file the header ends
 };
 
-/// Reads the header. Refuses, naming the file, what is not there or cannot be opened. A file without such fields gives
-/// an empty header.
+/// Reads the header. Refuses, naming the file, what is not there, cannot be opened or cannot be read to its end. A file
+/// without such fields gives an empty header.
 Result<SequenceHeader> read_sequence_header(const std::filesystem::path& path);
 
 std::string_view value_of(const SequenceHeader::Fields& fields, std::string_view key);

@@ -26,6 +26,7 @@ Result<void> check_lines(std::istream& in) {
     if (number > kMostLines)
       return Error{Errc::unsupported, fmt::format("has more than {} lines; give a part of it", kMostLines)};
   }
+  if (in.bad()) return Error{Errc::unreadable, kNotReadToItsEnd};
   if (in.eof()) return {};
   return Error{Errc::bad_format, fmt::format("line {} is longer than any line of a table; is it a text?", number)};
 }
@@ -63,11 +64,9 @@ Result<TextRows> TextRows::open(const std::filesystem::path& path) {
   if (!file) return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
   if (std::filesystem::file_size(path, ignored) > kMostBytes)
     return Error{Errc::unsupported, fmt::format("{}: is larger than 1 GB; give a part of it", path.string())};
-  if (std::filesystem::file_size(path, ignored) > kLongestRow) {
-    if (auto checked = check_lines(file); !checked) return checked.error().with_context(path.string());
-    file.clear();
-    file.seekg(0);
-  }
+  if (auto checked = check_lines(file); !checked) return checked.error().with_context(path.string());
+  file.clear();
+  file.seekg(0);
   std::string mark(3, '\0');
   file.read(mark.data(), 3);
   if (mark.starts_with("\xFF\xFE") || mark.starts_with("\xFE\xFF"))

@@ -25,7 +25,8 @@ struct TextRow {
 /// passed over.
 class TextRows {
  public:
-  /// Refuses, naming the file, what is not there, cannot be opened, is larger than 1 GB or is written in UTF-16.
+  /// Refuses, naming the file, what is not there, cannot be opened, cannot be read to its end, is larger than 1 GB
+  /// or is written in UTF-16.
   static Result<TextRows> open(const std::filesystem::path& path);
 
   /// The next line that is not blank; none at the end.

@@ -160,7 +160,10 @@ Result<std::vector<LoggedDecision>> read_decisions(const std::filesystem::path& 
   std::ifstream in(file);
   if (!in) return Error{Errc::not_found, file.string() + ": no such file; give the folder that live --out wrote"};
   std::string line;
-  if (!next_line(in, line, kLongestLine) || line != kHeader)
+  const Error unread{Errc::unreadable, fmt::format("{}: {}", file.string(), kNotReadToItsEnd)};
+  const bool begun = next_line(in, line, kLongestLine);
+  if (in.bad()) return unread;
+  if (!begun || line != kHeader)
     return Error{Errc::bad_format,
                  file.string() + ": is no table of a live window's decisions; give the folder that live --out wrote"};
   std::vector<LoggedDecision> out;
@@ -174,6 +177,7 @@ Result<std::vector<LoggedDecision>> read_decisions(const std::filesystem::path& 
                                file.string(), out.size() + 2)};
     out.push_back(*std::move(decision));
   }
+  if (in.bad()) return unread;
   if (in.fail() && !in.eof())
     return Error{Errc::bad_format, fmt::format("{}: line {} is longer than any; give the file as the window wrote it",
                                                file.string(), out.size() + 2)};

@@ -116,6 +116,8 @@ Result<void> RecordingReader::check_events() {
 Result<std::optional<EventOfLine>> RecordingReader::take_line() {
   std::string line;
   const bool there = next_line(lines_, line, kLongestLine);
+  if (lines_.bad())
+    return Error{Errc::unreadable, fmt::format("{}: {}", (path_ / kRecordingEvents).string(), kNotReadToItsEnd)};
   // What was cut lacks its end.
   const bool cut = lines_.eof();
   if (!there && !cut) {

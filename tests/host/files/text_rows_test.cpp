@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <sstream>
 
 #include "host/files/next_line.hpp"
+#include "host/files/sequence_header.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
@@ -73,6 +75,40 @@ TEST(NextLine, IsAsGetlineHasItAndNoLongerThanMayBe) {
   EXPECT_FALSE(next_line(in, line, 2));
   EXPECT_FALSE(in.eof()) << "it is longer, and not the end";
   EXPECT_FALSE(next_line(in, line, 2));
+}
+
+/// What a file on a damaged disk does: some of it comes, then an error.
+class Damaged : public std::filebuf {
+ public:
+  explicit Damaged(std::string text) : text_(std::move(text)) {
+    setg(text_.data(), text_.data(), text_.data() + text_.size());
+  }
+
+ private:
+  int_type underflow() override { throw std::ios::failure("basic_filebuf::underflow error reading the file"); }
+  std::string text_;
+};
+
+TEST(NextLine, LeavesTheStreamBadWhereTheFileCannotBeReadFurther) {
+  Damaged damaged("a\nb");
+  std::istream in(&damaged);
+  std::string line;
+  ASSERT_TRUE(next_line(in, line, 9));
+  EXPECT_EQ(line, "a");
+  EXPECT_FALSE(next_line(in, line, 9));
+  EXPECT_TRUE(in.bad());
+  EXPECT_FALSE(next_line(in, line, 9));
+}
+
+/// Nothing of this process's memory is at 0: the file opens, and a read gives an error.
+TEST(TextRows, NamesAFileThatCannotBeReadToItsEnd) {
+  const std::string words = "/proc/self/mem: cannot be read to its end; check its disk";
+  const auto rows = TextRows::open("/proc/self/mem");
+  ASSERT_FALSE(rows);
+  EXPECT_EQ(rows.error().what.find(words), 0U) << rows.error().what;
+  const auto header = read_sequence_header("/proc/self/mem");
+  ASSERT_FALSE(header);
+  EXPECT_EQ(header.error().what.find(words), 0U) << header.error().what;
 }
 
 TEST(TextRows, RefusesUtf16AndWhatIsNotThere) {

@@ -129,5 +129,11 @@ TEST(DecisionLog, SaysWhetherOverlaysWereOfAnotherShapeOrThereWereNone) {
   EXPECT_NE(why_not_judged({{1, before}}).find("3 frames bore one before"), std::string::npos);
 }
 
+TEST(DecisionLog, NamesAFileThatCannotBeReadToItsEnd) {
+  const auto read = read_decisions("/proc/self/mem");  // it opens, and a read gives an error
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().what.find("/proc/self/mem: cannot be read to its end"), 0U) << read.error().what;
+}
+
 }  // namespace
 }  // namespace birdseye::host
