@@ -19,7 +19,7 @@ struct Surface {
 };
 
 /// Reads a surface: VTK's legacy polygons (.vtk), PLY, STL or OBJ. Refuses, in one line that names the path, what is
-/// missing, unreadable, damaged, or holds no triangles.
+/// missing, unreadable, damaged, cut short, has a corner beyond kFarthestMm, or holds no triangles.
 Result<Surface> read_surface(const std::filesystem::path& path);
 
 /// The point of a surface that is nearest to a given point.

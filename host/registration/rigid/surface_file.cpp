@@ -15,8 +15,10 @@
 #include <vector>
 
 #include "calibration/base/lower_case.hpp"
+#include "calibration/geometry/rigid_matrix.hpp"
 #include "host/confine/run_confined_to.hpp"
 #include "host/registration/rigid/surface.hpp"
+#include "host/registration/rigid/surface_flaw.hpp"
 
 namespace birdseye::host {
 
@@ -136,12 +138,14 @@ Result<Surface> read_surface(const fs::path& path) {
         fmt::format("{}: is cut short in its header, which has no end_header; export it again", path.string())};
   constexpr Duration kLongest = Duration::from_ms(60'000);
   Surface surface;
-  std::string beside;
+  std::string beside, flaw;
   const auto ran = run_confined_to(
       path, {},
       [&path](const Send& send, std::vector<ProcessCopy>&) {
         std::string asked_for;
-        const Surface decoded = path.extension() == ".vtk" ? decode_vtk(path) : decode_others(path, asked_for);
+        const std::string flawed = flaw_of_surface(path);
+        Surface decoded;
+        if (flawed.empty()) decoded = path.extension() == ".vtk" ? decode_vtk(path) : decode_others(path, asked_for);
         const auto put = [&send](const auto& values) {
           const std::uint64_t count = values.size();
           send(&count, sizeof count);
@@ -150,12 +154,15 @@ Result<Surface> read_surface(const fs::path& path) {
         put(decoded.vertices_mm);
         put(decoded.triangles);
         put(asked_for);
+        put(flawed);
       },
-      [&surface, &beside](const Receive& receive) {
+      [&surface, &beside, &flaw](const Receive& receive) {
         surface.vertices_mm = taken<Eigen::Vector3f>(receive);
         surface.triangles = taken<std::array<std::uint32_t, 3>>(receive);
         const auto name = taken<char>(receive);
         beside.assign(name.begin(), name.end());
+        const auto words = taken<char>(receive);
+        flaw.assign(words.begin(), words.end());
       },
       kLongest);
   if (!ran && ran.error().code == Errc::io) return ran.error().with_context(path.string());
@@ -174,6 +181,7 @@ Result<Surface> read_surface(const fs::path& path) {
                                                 "PLY, STL, OBJ or VTK polygons",
                                                 path.string(), beside.substr(0, 255))};
   }
+  if (ran && !flaw.empty()) return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), flaw.substr(0, 255))};
   const bool sound = ran && !surface.triangles.empty() &&
                      std::all_of(surface.vertices_mm.begin(), surface.vertices_mm.end(),
                                  [](const Eigen::Vector3f& p) { return p.allFinite(); }) &&
@@ -185,6 +193,13 @@ Result<Surface> read_surface(const fs::path& path) {
     return Error{Errc::bad_format, fmt::format("{}: holds no triangles that can be read{}; export it as PLY, STL, OBJ "
                                                "or VTK polygons",
                                                path.string(), how)};
+  }
+  const auto is_far = [](const Eigen::Vector3f& p) { return p.cwiseAbs().maxCoeff() > kFarthestMm; };
+  if (const auto far = std::ranges::find_if(surface.vertices_mm, is_far); far != surface.vertices_mm.end()) {
+    return Error{Errc::bad_value,
+                 fmt::format("{}: a corner at {:g}, {:g}, {:g} mm is more than {:g} m from the origin; mend it, or "
+                             "export it again, in mm",
+                             path.string(), far->x(), far->y(), far->z(), kFarthestMm / 1000)};
   }
   return surface;
 }

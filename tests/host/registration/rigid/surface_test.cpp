@@ -2,8 +2,11 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
+#include <map>
 #include <numbers>
 #include <random>
 
@@ -233,11 +236,84 @@ TEST(SurfaceFile, RefusesWhatIsNoSurfaceInOneLine) {
                       "10 20 0\nPOLYGONS 1 4\n3 0 1 9\n"),
          "no triangles");
   expect(scratch.file("cut.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 300000000 float\n0 0"),
-         "no triangles");
+         "is cut short");
   expect(scratch.file("huge.vtk",
                       "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 10 0 0 "
                       "10 20 0\nPOLYGONS 1 900000000\n900000000 0 1 2\n"),
-         "no triangles");
+         "is cut short");
+}
+
+/// A wall of two triangles, 10 x 20 mm, in each form that is read; last: the z of its last corner.
+std::map<std::string, std::string> walls(const std::string& last = "5") {
+  const std::string head =
+      "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 2\nproperty list uchar int vertex_indices\nend_header\n";
+  const auto bytes = [](const auto& values, bool turned) {
+    std::string out;
+    for (const auto value : values) {
+      std::string one(reinterpret_cast<const char*>(&value), sizeof value);
+      if (turned) std::reverse(one.begin(), one.end());
+      out += one;
+    }
+    return out;
+  };
+  const std::array<float, 12> xyz{0, 0, 0, 10, 0, 0, 10, 20, 0, 0, 20, 5};
+  const std::array<int, 4> first{3, 0, 1, 2}, second{3, 0, 2, 3};
+  const auto face = [&](const auto& corners, bool turned) { return '\3' + bytes(corners, turned).substr(4); };
+  const auto triangles = [&](bool turned) { return face(first, turned) + face(second, turned); };
+  const std::string vtk = "# vtk DataFile Version 3.0\nx\n";
+  const std::string corner = "vertex 0 0 0\nvertex 10 20 0\nvertex ";
+  const auto facet = [&](const std::string& third) {
+    return "facet normal 0 0 0\nouter loop\n" + corner + third + "\nendloop\nendfacet\n";
+  };
+  std::string stl = std::string(80, 'x') + bytes(std::array<std::uint32_t, 1>{2}, false);
+  for (const std::array<float, 3>& third : {std::array<float, 3>{10, 0, 0}, {0, 20, 5}})
+    stl += bytes(std::array<float, 9>{0, 0, 0, 0, 0, 0, 10, 20, 0}, false) + bytes(third, false) + std::string(2, '\0');
+  return {
+      {"ascii.ply", "ply\nformat ascii 1.0\n" + head + "0 0 0\n10 0 0\n10 20 0\n0 20 " + last + "\n3 0 1 2\n3 0 2 3\n"},
+      {"little.ply", "ply\nformat binary_little_endian 1.0\n" + head + bytes(xyz, false) + triangles(false)},
+      {"big.ply", "ply\nformat binary_big_endian 1.0\n" + head + bytes(xyz, true) + triangles(true)},
+      {"lines.obj", "v 0 0 0\nv 10 0 0\nv 10 20 0\nv 0 20 " + last + "\nf 1 2 3\nf 1 3 4\n"},
+      {"ascii.stl", "solid wall\n" + facet("10 0 0") + facet("0 20 " + last) + "endsolid\n"},
+      {"binary.stl", stl},
+      {"ascii.vtk", vtk + "ASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0 10 0 0 10 20 0 0 20 " + last +
+                        "\nPOLYGONS 2 8\n3 0 1 2\n3 0 2 3\n"},
+      {"binary.vtk", vtk + "BINARY\nDATASET POLYDATA\nPOINTS 4 float\n" + bytes(xyz, true) + "\nPOLYGONS 2 8\n" +
+                         bytes(first, true) + bytes(second, true)}};
+}
+
+TEST(SurfaceFile, OneThatIsCutShortIsNotTakenForASmallerOne) {
+  const birdseye::testing::Scratch scratch;
+  for (const auto& [name, text] : walls()) {
+    const auto whole = read_surface(scratch.file(name, text));
+    ASSERT_TRUE(whole) << whole.error().what;
+    EXPECT_EQ(whole->triangles.size(), 2U) << name;
+    for (const std::size_t missing : {1, 3, 9, 17, 30}) {
+      if (name == "lines.obj" && text[text.size() - missing - 1] == '\n') continue;  // where nothing tells
+      if (name == "ascii.stl" && missing == 1) continue;
+      const auto cut = read_surface(scratch.file(name, text.substr(0, text.size() - missing)));
+      ASSERT_FALSE(cut) << name << " without " << missing;
+      EXPECT_EQ(cut.error().what.find((scratch / name).string() + ": is cut short"), 0U) << cut.error().what;
+    }
+  }
+}
+
+TEST(SurfaceFile, ACornerThatIsFarAwayIsRefusedHoweverItIsWritten) {
+  const birdseye::testing::Scratch scratch;
+  for (const char* far : {"99999999999999999999", "-99999999999999999999.5", "1e6", "100001"}) {
+    for (const auto& [name, text] : walls(far)) {
+      if (!name.starts_with("ascii") && name != "lines.obj") continue;
+      const auto surface = read_surface(scratch.file(name, text));
+      ASSERT_FALSE(surface) << name << " " << far;
+      const std::string& what = surface.error().what;
+      EXPECT_EQ(what.find((scratch / name).string() + ": "), 0U) << what;
+      EXPECT_TRUE(what.find("has a coordinate of more than 18 digits") != std::string::npos ||
+                  what.find("is more than 100 m from the origin") != std::string::npos)
+          << what;
+    }
+  }
+  for (const auto& [name, text] : walls("5.00000000000000000000000001"))
+    EXPECT_TRUE(read_surface(scratch.file(name, text))) << name;
 }
 
 TEST(SurfaceRefinement, PelvisPhantomAsPublishedAndBeyond) {
