@@ -6,7 +6,7 @@
 #include <fstream>
 #include <optional>
 
-#include "host/files/next_line.hpp"
+#include "drivers/system/next_line.hpp"
 
 namespace birdseye::host {
 

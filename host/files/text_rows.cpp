@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
+#include "drivers/system/next_line.hpp"
 #include "drivers/system/whole_file.hpp"
 #include "host/files/name_order.hpp"
-#include "host/files/next_line.hpp"
 #include "host/files/pose_collector.hpp"
 
 namespace birdseye::host {

@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "drivers/system/durable.hpp"
+#include "drivers/system/next_line.hpp"
 #include "drivers/system/whole_file.hpp"
-#include "host/files/next_line.hpp"
 #include "host/simulated/simulated_truth.hpp"
 #include "host/texts/texts.hpp"
 

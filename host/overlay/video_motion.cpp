@@ -24,6 +24,7 @@ constexpr double kAhead_mm = 100;      // from the camera to what is told of noi
 constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
 constexpr double kPlainly = 3;         // so many times as far off would be plain
 constexpr double kNearlyOff = 0.75;    // of what is allowed: places farther off neither agree nor differ
+constexpr double kOnTheWay = 0.5;      // a key that began here would hide half of what is wrong
 constexpr double kHastePx = 5;         // of the small picture: a key whose poses leave so much open hides what is wrong
 constexpr double kFarthestStepPx = 20;  // of the small picture: what moves farther in one frame is not followed safely
 constexpr double kOfHaste = 0.4;        // of the poses' haste, places move so much at least; where poses leap, less
@@ -118,6 +119,8 @@ void VideoMotion::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tr
     reset();
     poses_ = averaged_poses();
   }
+  // What has moved meanwhile the next picture tells.
+  if (const auto newest = poses_.newest(); newest && acquired - *newest > kUnjudged) doubt(acquired);
   note_noise(acquired, tracker_from_sensor);
   poses_.push(acquired, Duration{0}, tracker_from_sensor);
 }
@@ -272,11 +275,12 @@ void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
   const bool hasty = poses_step_px > kFarthestStepPx && waiting.farthest_step_px > kOfHaste * poses_step_px;
   const bool lost = hasty || waiting.then.size() < kFewest;
   const Judged judged = lost ? Judged::not_odd : judge(waiting, *from, scope);
-  // Places that are nearly off are followed for three seconds more: the next pictures tell.
-  const bool nearly_off = key_->off > kNearlyOff && waiting.at - key_->at < kLongest + kLongest;
+  // Places that are nearly off, or on their way there, are followed for three seconds more: the next pictures tell.
+  const bool on_the_way = key_->off > kOnTheWay && waiting.at - key_->at < kLongest + kLongest;
+  const bool nearly_off = on_the_way && key_->off > kNearlyOff;
   const bool calmer = !nearly_off && key_->from->unsure_px > std::max(2 * from->unsure_px, kHastePx * small_px);
   // Not while the poses leave much open: what leaps then would lie between two keys.
-  const bool old = !nearly_off && waiting.at - key_->at >= kLongest && from->unsure_px <= kHastePx * small_px;
+  const bool old = !on_the_way && waiting.at - key_->at >= kLongest && from->unsure_px <= kHastePx * small_px;
   const bool renew = judged == Judged::odd ? odd_ >= kOddInRow : judged == Judged::of_what_is_left || calmer || old;
   if (!lost && !renew) return;
   // The next key begins where these places have come to: what moved them is not seen in any later picture.

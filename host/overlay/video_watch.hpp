@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <utility>
 
 #include "host/overlay/field_watch.hpp"
 #include "host/overlay/scope_setup.hpp"
@@ -42,8 +43,9 @@ class VideoWatch {
     motion_.take(frame, picture, scope, farthest_mm(target_in_camera_mm));
     if (sudden_.take(frame, picture, scope, target_mm)) motion_.doubt(frame.info.acquired);
     const bool differed = before == VideoAgreement::differs;
-    return {motion_.state() != before, field_.take(frame, scope), motion_.contradicted() && !differed,
-            motion_.contradicted() && differed};
+    // Poses may have changed it too, since the last frame.
+    const bool news = std::exchange(told_, motion_.state()) != motion_.state();
+    return {news, field_.take(frame, scope), motion_.contradicted() && !differed, motion_.contradicted() && differed};
   }
 
   /// A frame that is not to be looked at: what agreed is in doubt until a later one agrees.
@@ -73,6 +75,7 @@ class VideoWatch {
   }
 
   bool single_poses_ = false;
+  VideoAgreement told_ = VideoAgreement::untold;  ///< by the last frame
   VideoMotion motion_;
   SuddenMotion sudden_;
   FieldWatch field_;

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/next_line.hpp"
 #include "drivers/system/wait.hpp"
 #include "drivers/system/whole_file.hpp"
-#include "host/files/next_line.hpp"
 #include "host/files/pose_collector.hpp"
 #include "host/recording/recording_writer.hpp"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "calibration/base/lower_case.hpp"
-#include "host/files/next_line.hpp"
+#include "drivers/system/next_line.hpp"
 
 namespace birdseye::host {
 
@@ -22,6 +22,8 @@ constexpr const char* kCut =
     "is cut short: it holds less than it promises, or its last line has no end; export it again";
 constexpr const char* kHuge =
     "has a coordinate of more than 18 digits, which its decoder takes for another; mend it, or export it again";
+constexpr const char* kNewer =
+    "is a VTK file of version 5, which its decoder does not read; save it as version 4.2, or as PLY";
 
 /// Whether a number of the line has more digits before its point than fit 64 bits.
 bool has_huge_number(std::string_view line) {
@@ -69,6 +71,7 @@ std::string flaw_of_vtk(std::istream& in) {
   std::string line;
   for (int i = 0; i < 3; ++i) {  // version, title, then ASCII or BINARY
     if (!next_line(in, line, kLongestLine)) return {};
+    if (i == 0 && line.find("Version 5") != std::string::npos) return kNewer;
   }
   const bool binary = first_word(line) == "BINARY";
   while (next_line(in, line, kLongestLine)) {

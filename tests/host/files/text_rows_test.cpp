@@ -5,7 +5,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "host/files/next_line.hpp"
+#include "drivers/system/next_line.hpp"
 #include "host/files/sequence_header.hpp"
 #include "tests/support/scratch.hpp"
 

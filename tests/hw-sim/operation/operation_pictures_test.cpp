@@ -116,6 +116,13 @@ TEST(OperationWithPictures, AScopeThatTurnsInItsHolderTakesTheOverlayAway) {
   EXPECT_EQ(out.log.find("the overlay is whole", turned), std::string::npos) << out.log;
 }
 
+/// The overlay stayed for five seconds once: as the scope turned, places that had begun to go with it made way for new
+/// ones, to which only the rest of the turn was to be seen.
+TEST(OperationWithPictures, AScopeThatTurnsWhileNewPlacesAreChosenTakesTheOverlayAway) {
+  const OperationOutcome out = operate_with(usual(FaultKind::scope_turned, 59.3, 30, {{"deg", 30}, {"over_s", 0.5}}));
+  EXPECT_LT(says_at_s(out.log, "there is no overlay", 59.3), 60) << out.log;
+}
+
 /// The overlay came back once: no pose came for 0.4 s, and the places in the video were lost meanwhile.
 TEST(OperationWithPictures, AScopeThatTurnsWhileNoPoseComesIsNotDrawnBy) {
   const OperationOutcome out = operate_with(usual(FaultKind::scope_turned, 60, 30, {{"deg", 30}, {"over_s", 0.5}}),

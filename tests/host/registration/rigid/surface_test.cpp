@@ -298,6 +298,16 @@ TEST(SurfaceFile, OneThatIsCutShortIsNotTakenForASmallerOne) {
   }
 }
 
+TEST(SurfaceFile, OfVtksNewerVersionTheRemedyIsSaid) {
+  const birdseye::testing::Scratch scratch;
+  const auto newer = read_surface(scratch.file(
+      "newer.vtk",
+      "# vtk DataFile Version 5.1\nvtk output\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 9 0 0 0 9 0\n"
+      "POLYGONS 2 3\nOFFSETS vtktypeint64\n0 3\nCONNECTIVITY vtktypeint64\n0 1 2\n"));
+  ASSERT_FALSE(newer);
+  EXPECT_NE(newer.error().what.find("save it as version 4.2"), std::string::npos) << newer.error().what;
+}
+
 TEST(SurfaceFile, ACornerThatIsFarAwayIsRefusedHoweverItIsWritten) {
   const birdseye::testing::Scratch scratch;
   for (const char* far : {"99999999999999999999", "-99999999999999999999.5", "1e6", "100001"}) {

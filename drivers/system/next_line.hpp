@@ -4,7 +4,7 @@
 #include <istream>
 #include <string>
 
-namespace birdseye::host {
+namespace birdseye {
 
 /// What to say of a file, behind its name, whose stream next_line() left bad.
 constexpr const char* kNotReadToItsEnd = "cannot be read to its end; check its disk, or give another copy";
@@ -33,4 +33,4 @@ inline bool next_line(std::istream& in, std::string& line, std::size_t most_byte
   return !line.empty();
 }
 
-}  // namespace birdseye::host
+}  // namespace birdseye
