@@ -223,7 +223,7 @@ std::string twice_in(const YAML::Node& map, int deeper = 1) {
   if (!map.IsMap()) return {};
   std::set<std::string> keys;
   for (const auto& item : map) {
-    const auto key = item.first.as<std::string>();
+    auto key = item.first.as<std::string>();
     if (!keys.insert(key).second) return key;
     if (deeper == 0) continue;
     if (std::string twice = twice_in(item.second, deeper - 1); !twice.empty()) return twice;

@@ -98,7 +98,8 @@ void OperationLaws::take_kept(const host::OperationView& view, std::uint64_t fai
   // What a window has not taken up yet is there all the same.
   if (!to_take_up_) {
     const std::optional<Found> found = found_in(view, now_s);
-    nothing_kept_ = !found && !view.registration_held_back && (nothing_kept_ || all_kept);
+    // What is being written may be what was found and taken back since somebody last looked here.
+    nothing_kept_ = !found && !view.registration_held_back && (all_kept || (nothing_kept_ && !view.writing));
     // Nobody has taken back what is held back.
     if ((all_kept || !found) && !view.registration_held_back) kept_.clear();
     if (found && std::ranges::count(kept_, *found) == 0 && (all_kept || !kept_.empty())) kept_.push_back(*found);

@@ -229,6 +229,18 @@ TEST(Operation, MendedSeed5000221HasABirdThatFreezesBeforeItsNoiseIsKnown) {
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
+/// A law was wrong: of six touches, taken back one after the other, five gave a registration, and the power went as
+/// that was being written.
+TEST(Operation, MendedSeed219663286TakesUpWhatWasTakenBackAsItWasWritten) {
+  FaultScript script =
+      programs_end({usual(FaultKind::window_restart, 51.633, 7.75), usual(FaultKind::appliance_restart, 64.324, 9.377),
+                    usual(FaultKind::power_cut, 113.537, 47.16, {{"after_syncs", 2}})});
+  script.tracker = {usual(FaultKind::power_cycle, 100.555, 3.866, {{"boot_s", 1.856}})};
+  const OperationOutcome out = operate({.seed = 219663286, .minutes = 3, .faults = script, .reference = false});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_NE(out.log.find("the window's machine has no power"), std::string::npos);
+}
+
 /// A law was wrong: a pointer that froze as it turned was 1.7 degrees off before its records told of it.
 TEST(Operation, MendedSeed2000503HasAPointerThatFreezesAsItTurns) {
   const OperationOutcome out = operate({.seed = 2000503, .minutes = 6.5});
