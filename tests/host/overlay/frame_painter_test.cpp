@@ -9,7 +9,7 @@
 namespace birdseye::host {
 namespace {
 
-constexpr TrustFigures kGoodFigures{{0.3, 2, 1}, 0.5, 2};
+const TrustFigures kGoodFigures{{0.3, 2, 1}, 0.5, 2};
 
 /// Draws the same picture, whatever it is asked for.
 class Drawn final : public Engine {

@@ -288,7 +288,7 @@ TEST(SurfaceFile, OneThatIsCutShortIsNotTakenForASmallerOne) {
     const auto whole = read_surface(scratch.file(name, text));
     ASSERT_TRUE(whole) << whole.error().what;
     EXPECT_EQ(whole->triangles.size(), 2U) << name;
-    for (const std::size_t missing : {1, 3, 9, 17, 30}) {
+    for (const std::size_t missing : {1U, 3U, 9U, 17U, 30U}) {
       if (name == "lines.obj" && text[text.size() - missing - 1] == '\n') continue;  // where nothing tells
       if (name == "ascii.stl" && missing == 1) continue;
       const auto cut = read_surface(scratch.file(name, text.substr(0, text.size() - missing)));
