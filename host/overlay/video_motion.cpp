@@ -16,6 +16,7 @@ namespace {
 using Relative = Transform<Camera, Camera>;
 
 constexpr Duration kEvery = Duration::from_ms(100), kLongest = Duration::from_ms(3000);
+constexpr Duration kOnTheWayFor = Duration::from_ms(1000);
 constexpr Duration kUnjudged = Duration::from_ms(250);  // without a judged picture: what has moved is not known
 constexpr Duration kAverage = Duration::from_ms(40);    // half the width of what a pose is averaged over
 constexpr std::size_t kFewest = 15;
@@ -275,12 +276,14 @@ void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
   const bool hasty = poses_step_px > kFarthestStepPx && waiting.farthest_step_px > kOfHaste * poses_step_px;
   const bool lost = hasty || waiting.then.size() < kFewest;
   const Judged judged = lost ? Judged::not_odd : judge(waiting, *from, scope);
-  // Places that are nearly off, or on their way there, are followed for three seconds more: the next pictures tell.
-  const bool on_the_way = key_->off > kOnTheWay && waiting.at - key_->at < kLongest + kLongest;
-  const bool nearly_off = on_the_way && key_->off > kNearlyOff;
+  // Places that are nearly off are followed for three seconds more, and those on their way there for one: the next
+  // pictures tell.
+  const Duration age = waiting.at - key_->at;
+  const bool nearly_off = key_->off > kNearlyOff && age < kLongest + kLongest;
+  const bool on_the_way = key_->off > kOnTheWay && age < kLongest + kOnTheWayFor;
   const bool calmer = !nearly_off && key_->from->unsure_px > std::max(2 * from->unsure_px, kHastePx * small_px);
   // Not while the poses leave much open: what leaps then would lie between two keys.
-  const bool old = !on_the_way && waiting.at - key_->at >= kLongest && from->unsure_px <= kHastePx * small_px;
+  const bool old = !nearly_off && !on_the_way && age >= kLongest && from->unsure_px <= kHastePx * small_px;
   const bool renew = judged == Judged::odd ? odd_ >= kOddInRow : judged == Judged::of_what_is_left || calmer || old;
   if (!lost && !renew) return;
   // The next key begins where these places have come to: what moved them is not seen in any later picture.

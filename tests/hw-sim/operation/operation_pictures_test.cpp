@@ -77,7 +77,7 @@ TEST(OperationWithPictures, MendedSeed33AccusesNobody) {
 TEST(OperationWithPictures, ABumpThatWasSeenBringsNothingBackUnlooked) {
   FaultScript script;
   script.world = {{FaultKind::transmitter_bumped, 60, std::nullopt, {{"mm", 15}, {"deg", 5}, {"over_s", 0.2}}}};
-  const OperationOutcome out = operate({.seed = 5, .minutes = 2.5, .faults = script, .pictures = true});
+  const OperationOutcome out = operate({.seed = 5, .minutes = 3.5, .faults = script, .pictures = true});
   EXPECT_TRUE(out.broken.empty()) << told(out);
   EXPECT_EQ(out.laws.moved, 1U) << out.log;
   EXPECT_EQ(out.laws.moved_unwatched, 0U) << out.log;
