@@ -1,17 +1,26 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <compare>
 #include <cstdint>
 
 namespace birdseye {
 
+/// How far from zero an instant may be, and how long a span, where either comes from outside: 73 years. Times since
+/// 1970 are within until 2043, and three of them can be added or subtracted without overflow.
+inline constexpr std::int64_t kFarthest_ns = std::int64_t{1} << 61;
+
 /// A span of time, ns. One type for both clocks: their rates differ by parts per million, which clock lines estimate.
 struct Duration {
   std::int64_t ns = 0;
   auto operator<=>(const Duration&) const = default;
   [[nodiscard]] double seconds() const { return static_cast<double>(ns) * 1e-9; }
-  static Duration from_seconds(double seconds) { return {static_cast<std::int64_t>(seconds * 1e9)}; }
+  /// seconds: one that is longer than kFarthest_ns becomes as long as that.
+  static Duration from_seconds(double seconds) {
+    constexpr auto kFarthest = static_cast<double>(kFarthest_ns);
+    return {static_cast<std::int64_t>(std::min(std::max(-kFarthest, seconds * 1e9), kFarthest))};
+  }
   static constexpr Duration from_ms(std::int64_t ms) { return {ms * 1'000'000}; }
   Duration operator+(Duration other) const { return {ns + other.ns}; }
   Duration operator-(Duration other) const { return {ns - other.ns}; }

@@ -160,7 +160,6 @@ std::optional<RawEvent> event_of(std::uint32_t kind, const Bytes& payload) {
 
 constexpr std::size_t kMostBirds = 14;
 constexpr Duration kLongest = Duration::from_ms(10'000);
-constexpr std::int64_t kFarthest_ns = 1LL << 60;  // 36 years: times can be added and subtracted without overflow
 
 bool is_rate(double hz) {
   return hz >= 1e-3 && hz <= 1e6;  // false of NaN

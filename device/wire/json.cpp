@@ -21,6 +21,12 @@ template void get_whole(const json& in, int& out);
 template void get_whole(const json& in, std::int64_t& out);
 template void get_whole(const json& in, std::uint64_t& out);
 
+void get_time(const json& in, std::int64_t& ns) {
+  get_whole(in, ns);
+  if (ns < -kFarthest_ns || ns > kFarthest_ns)
+    throw json::out_of_range::create(406, "a time within 73 years of zero is wanted", &in);
+}
+
 namespace {
 
 /// Gives every member, with its key, to `each`.
@@ -110,18 +116,18 @@ void to_json(json& out, const FrameInfo& info) {
 
 void from_json(const json& in, FrameInfo& info) {
   get_whole(in.at("sequence"), info.sequence);
-  get_whole(in.at("acquired_ns"), info.acquired.ns);
-  get_whole(in.at("acquired_sigma_ns"), info.acquired_sigma.ns);
-  get_whole(in.at("arrived_ns"), info.arrived.ns);
+  get_time(in.at("acquired_ns"), info.acquired.ns);
+  get_time(in.at("acquired_sigma_ns"), info.acquired_sigma.ns);
+  get_time(in.at("arrived_ns"), info.arrived.ns);
   get_whole(in.at("frames_dropped"), info.frames_dropped);
-  if (in.contains("latency_ns")) get_whole(in.at("latency_ns"), info.latency.emplace().ns);
+  if (in.contains("latency_ns")) get_time(in.at("latency_ns"), info.latency.emplace().ns);
   const json& pose = in.at("pose");
   const auto kind = pose.at("kind").get<std::string>();
   pose.at("reason").get_to(info.pose.reason);
   pose.at("sigma_mm").get_to(info.pose.position_sigma_mm);
-  get_whole(pose.at("time_sigma_ns"), info.pose.time_sigma.ns);
+  get_time(pose.at("time_sigma_ns"), info.pose.time_sigma.ns);
   pose.at("speed_mm_s").get_to(info.pose.speed_mm_s);
-  get_whole(pose.at("age_ns"), info.pose.age.ns);
+  get_time(pose.at("age_ns"), info.pose.age.ns);
   const json& matrix = pose.at("tracker_from_scope");
   for (const PoseKind known : {PoseKind::exact, PoseKind::interpolated, PoseKind::predicted}) {
     if (kind != to_string(known) || matrix.size() != 16) continue;
@@ -138,7 +144,7 @@ void to_json(json& out, const Doubt& doubt) {
   out = {{"acquired_ns", doubt.acquired.ns}, {"bird", doubt.bird}, {"why", doubt.why}};
 }
 void from_json(const json& in, Doubt& doubt) {
-  get_whole(in.at("acquired_ns"), doubt.acquired.ns);
+  get_time(in.at("acquired_ns"), doubt.acquired.ns);
   in.at("bird").get_to(doubt.bird);
   in.at("why").get_to(doubt.why);
 }
@@ -151,10 +157,10 @@ void to_json(json& out, const ClockChange& change) {
          {"by_ppm", change.by_ppm}};
 }
 void from_json(const json& in, ClockChange& change) {
-  get_whole(in.at("at_ns"), change.at.ns);
+  get_time(in.at("at_ns"), change.at.ns);
   in.at("clock").get_to(change.clock);
   in.at("kind").get_to(change.kind);
-  get_whole(in.at("by_ns"), change.by.ns);
+  get_time(in.at("by_ns"), change.by.ns);
   in.at("by_ppm").get_to(change.by_ppm);
 }
 
@@ -163,14 +169,14 @@ void to_json(json& out, const Pedal& pedal) {
 }
 void from_json(const json& in, Pedal& pedal) {
   in.at("pressed").get_to(pedal.pressed);
-  get_whole(in.at("at_ns"), pedal.at.ns);
+  get_time(in.at("at_ns"), pedal.at.ns);
 }
 
 void to_json(json& out, const ClockPing& ping) {
   out = {{"host_sent_ns", ping.host_sent_ns}};
 }
 void from_json(const json& in, ClockPing& ping) {
-  get_whole(in.at("host_sent_ns"), ping.host_sent_ns);
+  get_time(in.at("host_sent_ns"), ping.host_sent_ns);
 }
 
 void to_json(json& out, const ClockPong& pong) {
@@ -178,9 +184,9 @@ void to_json(json& out, const ClockPong& pong) {
       {"host_sent_ns", pong.host_sent_ns}, {"device_received_ns", pong.received.ns}, {"device_sent_ns", pong.sent.ns}};
 }
 void from_json(const json& in, ClockPong& pong) {
-  get_whole(in.at("host_sent_ns"), pong.host_sent_ns);
-  get_whole(in.at("device_received_ns"), pong.received.ns);
-  get_whole(in.at("device_sent_ns"), pong.sent.ns);
+  get_time(in.at("host_sent_ns"), pong.host_sent_ns);
+  get_time(in.at("device_received_ns"), pong.received.ns);
+  get_time(in.at("device_sent_ns"), pong.sent.ns);
 }
 
 void to_json(json& out, const Subscription& subscription) {
@@ -229,9 +235,9 @@ void from_json(const json& in, WallClock& clock) {
   in.at("known").get_to(clock.known);
   in.at("synchronised").get_to(clock.synchronised);
   in.at("tai_known").get_to(clock.tai_known);
-  get_whole(in.at("max_error_ns"), clock.max_error_ns);
-  get_whole(in.at("est_error_ns"), clock.est_error_ns);
-  get_whole(in.at("wall_minus_monotonic_ns"), clock.wall_minus_monotonic_ns);
+  get_time(in.at("max_error_ns"), clock.max_error_ns);
+  get_time(in.at("est_error_ns"), clock.est_error_ns);
+  get_time(in.at("wall_minus_monotonic_ns"), clock.wall_minus_monotonic_ns);
   in.at("source").get_to(clock.source);
 }
 

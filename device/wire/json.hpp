@@ -17,6 +17,9 @@ std::string text_of(const nlohmann::json& json);
 template <typename Whole>
 void get_whole(const nlohmann::json& in, Whole& out);
 
+/// A whole number of ns that is no farther from zero than kFarthest_ns.
+void get_time(const nlohmann::json& in, std::int64_t& ns);
+
 void to_json(nlohmann::json& json, const FrameInfo& info);
 void from_json(const nlohmann::json& json, FrameInfo& info);
 void to_json(nlohmann::json& json, const ClockChange& change);

@@ -42,11 +42,20 @@ std::string in_a_cell(std::string words) {
   return words;
 }
 
-std::optional<double> number_in(const std::string& cell) {
-  double out = 0;
+template <typename Number>
+std::optional<Number> read_in(const std::string& cell) {
+  Number out = 0;
   const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), out);
   if (error != std::errc() || end != cell.data() + cell.size()) return std::nullopt;
   return out;
+}
+
+std::optional<double> number_in(const std::string& cell) {
+  return read_in<double>(cell);
+}
+
+std::optional<std::uint64_t> count_in(const std::string& cell) {
+  return read_in<std::uint64_t>(cell);
 }
 
 std::optional<ErrorBudget> budget_of(const std::vector<std::string>& cells) {
@@ -70,13 +79,13 @@ std::optional<ErrorBudget> budget_of(const std::vector<std::string>& cells) {
 std::optional<LoggedDecision> decision_of(const std::vector<std::string>& cells) {
   if (cells.size() != kBeforeMatrix && cells.size() != kBeforeMatrix + 16) return std::nullopt;
   LoggedDecision out;
-  const auto sequence = number_in(cells[0]), age_ms = number_in(cells[1]), strength = number_in(cells[2]),
-             shape = number_in(cells[3]);
-  if (!sequence || !age_ms || !strength || !shape || *sequence < 0 || *shape < 0) return std::nullopt;
-  out.sequence = static_cast<std::uint64_t>(*sequence);
+  const auto sequence = count_in(cells[0]), shape = count_in(cells[3]);
+  const auto age_ms = number_in(cells[1]), strength = number_in(cells[2]);
+  if (!sequence || !age_ms || !strength || !shape) return std::nullopt;
+  out.sequence = *sequence;
   out.age_ms = *age_ms;
   out.strength = *strength;
-  out.shape = static_cast<std::uint64_t>(*shape);
+  out.shape = *shape;
   if (!cells[4].empty() && !(out.expected = budget_of(cells))) return std::nullopt;
   out.reason = cells[5];
   out.said = cells[6];

@@ -29,7 +29,7 @@ json json_of(const wire::Birds& birds) {
 /// Throws json::exception, or std::invalid_argument for a matrix that is no pose.
 wire::Birds birds_of(const json& in) {
   wire::Birds birds;
-  wire::get_whole(in.at("acquired_ns"), birds.acquired.ns);
+  wire::get_time(in.at("acquired_ns"), birds.acquired.ns);
   for (const json& bird : in.at("birds")) {
     const json& rows = bird.at("tracker_from_sensor");
     if (rows.size() != 16) throw std::invalid_argument("a pose has 16 numbers");

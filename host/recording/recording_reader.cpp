@@ -21,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLongestLine = std::size_t{1} << 20U;
+constexpr double kMostNumber = 1e15;  // a double counts so far by ones
 
 /// "StylusToTracker" -> "stylus".
 std::string bird_name(std::string transform) {
@@ -34,6 +35,14 @@ void add(calibration::Sha256& sum, const std::string& text) {
   sum.add({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
+/// A field that tells seconds, where it tells a time that can be.
+std::optional<Duration> span_in(std::string_view field) {
+  const ReadNumber read = read_number(field);
+  if (!read.problem.empty() || std::abs(read.value) * 1e9 >= static_cast<double>(kFarthest_ns)) return std::nullopt;
+  return Duration{std::llround(read.value * 1e9)};
+}
+
+/// The time of a frame, or of birds.
 std::optional<DeviceTime> time_of(const wire::Event& event) {
   if (const auto* frame = std::get_if<wire::VideoFrame>(&event))
     return std::max(frame->info.acquired, frame->info.arrived);
@@ -142,12 +151,12 @@ Result<std::optional<EventOfLine>> RecordingReader::take_line() {
 }
 
 Result<void> RecordingReader::make_events(std::size_t number, const SequenceHeader::Fields& fields) {
-  const ReadNumber time = read_number(value_of(fields, kTimestampField));
-  if (!time.problem.empty()) {
+  const auto since_zero = span_in(value_of(fields, kTimestampField));
+  if (!since_zero) {
     notes_.push_back(fmt::format("frame {} has no time and is passed over", number));
     return {};
   }
-  const DeviceTime acquired{std::llround(time.value * 1e9)};
+  const DeviceTime acquired{since_zero->ns};
   wire::Birds birds{acquired, {}};
   wire::VideoFrame frame;
   frame.info.pose.reason = scope_ + " missing";
@@ -169,16 +178,14 @@ Result<void> RecordingReader::make_events(std::size_t number, const SequenceHead
   const std::string_view status = value_of(fields, kImageStatusField);
   if (sequence_->width_px() == 0 || (!status.empty() && status != kStatusOk)) return {};
   const ReadNumber counted = read_number(value_of(fields, kFrameNumberField));
-  frame.info.sequence =
-      counted.problem.empty() && counted.value >= 0 ? static_cast<std::uint64_t>(counted.value) : number;
+  const bool countable = counted.problem.empty() && counted.value >= 0 && counted.value <= kMostNumber;
+  frame.info.sequence = countable ? static_cast<std::uint64_t>(counted.value) : number;
   frame.info.acquired = frame.info.arrived = acquired;
   // As RecordingWriter has them; PLUS says nothing of the kind.
-  if (const ReadNumber sigma_s = read_number(value_of(fields, "TimestampSigma")); sigma_s.problem.empty())
-    frame.info.acquired_sigma = Duration::from_seconds(sigma_s.value);
+  if (const auto sigma = span_in(value_of(fields, "TimestampSigma"))) frame.info.acquired_sigma = *sigma;
   if (const ReadNumber sigma_mm = read_number(value_of(fields, "PoseSigmaMm")); sigma_mm.problem.empty())
     frame.info.pose.position_sigma_mm = sigma_mm.value;
-  if (const ReadNumber latency_s = read_number(value_of(fields, "Latency")); latency_s.problem.empty())
-    frame.info.latency = Duration::from_seconds(latency_s.value);
+  frame.info.latency = span_in(value_of(fields, "Latency"));
   frame.width_px = sequence_->width_px();
   frame.height_px = sequence_->height_px();
   made_.push_back({frame, {"", number}});

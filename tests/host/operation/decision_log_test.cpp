@@ -111,6 +111,25 @@ TEST(DecisionLog, ALineThatIsCutShortIsTheLastOrAnError) {
   EXPECT_NE(read.error().what.find("line 4"), std::string::npos) << read.error().what;
 }
 
+/// What such a number is turned into is undefined.
+TEST(DecisionLog, ANumberThatCountsNothingIsAnError) {
+  const testing::Scratch scratch;
+  {
+    auto log = DecisionLog::open(scratch / "out");
+    ASSERT_TRUE(log);
+    log->add(withheld());
+  }
+  const std::string text = testing::contents_of(scratch / "out/frames.csv");
+  const auto line = text.find('\n') + 1;
+  for (const std::string number : {"1e38", "-1", "0.5", "99999999999999999999"}) {
+    // A line follows it: the last may be one that is cut short.
+    const std::string row = text.substr(text.find(',', line)), other = text.substr(0, line) + number + row + '7' + row;
+    const auto read = read_decisions(scratch.file("frames.csv", other));
+    ASSERT_FALSE(read) << number;
+    EXPECT_NE(read.error().what.find("line 2"), std::string::npos) << read.error().what;
+  }
+}
+
 TEST(DecisionLog, AnotherTableIsRefused) {
   const testing::Scratch scratch;
   const auto read = read_decisions(scratch.file("frames.csv", "sequence,acquired_ns\n1,2\n"));

@@ -200,6 +200,33 @@ TEST(Recording, ASequenceAloneIsPlayedToo) {
   EXPECT_NE(other.ending.what.find("PointerToTracker, ScopeToTracker"), std::string::npos) << other.ending.what;
 }
 
+/// Numbers that no time and no count can be: what they would be turned into is undefined.
+TEST(Recording, ASequencesTimesAndNumbersThatCannotBeAreAbsent) {
+  const Scratch scratch;
+  record(scratch / "r", session(2));
+  const auto played_with = [&](const std::string& field, const std::string& number) {
+    std::string text = contents_of(scratch / "r/video.igs.mha");
+    const std::string key = "Seq_Frame0000_" + field + " = ";
+    const auto value = text.find(key) + key.size();
+    EXPECT_GT(value, key.size()) << field;
+    text.replace(value, text.find('\n', value) - value, number);
+    return play(scratch.file("other.igs.mha", text));
+  };
+  const auto first_frame = [](const Played& played) {
+    for (const wire::Event& event : played.events)
+      if (const auto* f = std::get_if<wire::VideoFrame>(&event)) return f->info;
+    return wire::FrameInfo{};
+  };
+  for (const std::string number : {"1e38", "-1e38", "1e300"}) {
+    EXPECT_EQ(first_frame(played_with("FrameNumber", number)).sequence, 0U) << number;
+    EXPECT_EQ(first_frame(played_with("TimestampSigma", number)).acquired_sigma.ns, 0) << number;
+    const Played untimed = played_with("Timestamp", number);
+    EXPECT_EQ(first_frame(untimed).sequence, frame(1, 16, 12).info.sequence) << "frame 0 is passed over";
+    ASSERT_EQ(untimed.notes.size(), 1U);
+    EXPECT_NE(untimed.notes[0].find("frame 0 has no time"), std::string::npos) << untimed.notes[0];
+  }
+}
+
 /// What video.igs.mha says of the transforms of frame 4, where only one bird has told its name before.
 std::string transforms_after(const std::string& bird, const Eigen::Vector3d& off_mm) {
   const Scratch scratch;
@@ -398,10 +425,12 @@ TEST(Recording, DamageIsNamed) {
   EXPECT_EQ(RecordingWriter::create({.folder = scratch / "r", .source = ""}).error().code, Errc::in_use);
 }
 
-/// What such a number is turned into is undefined.
-TEST(Recording, ATimeThatIsNoWholeNumberIsDamage) {
+/// What such a number is turned into is undefined, and so is the difference of times that are farther apart than a
+/// clock can count.
+TEST(Recording, ATimeThatIsNoWholeNumberOrCannotBeIsDamage) {
   EXPECT_TRUE(parse_event_line(R"({"Doubt":{"acquired_ns":12,"bird":"scope","why":""}})"));
-  for (const std::string time : {"1.5", "1e67", "1e2", "true", "99999999999999999999"}) {
+  for (const std::string time :
+       {"1.5", "1e67", "1e2", "true", "99999999999999999999", "9223372036854775807", "-2305843009213693953"}) {
     const auto read = parse_event_line(R"({"Doubt":{"acquired_ns":)" + time + R"(,"bird":"scope","why":""}})");
     EXPECT_FALSE(read) << time;
   }
