@@ -141,7 +141,7 @@ MUTANTS = (
            "const std::uint64_t ns = stamp & 0xFFFFFFFFU;",
            "A stamp's fraction of 2^32 is taken for nanoseconds.", r"^Wire\.BirdsStatusAndHealth", ("device_wire_test",)),
     Mutant("arrival", "device/wire/json.cpp",
-           'get_whole(in.at("acquired_ns"), info.acquired.ns);', 'get_whole(in.at("arrived_ns"), info.acquired.ns);',
+           'get_time(in.at("acquired_ns"), info.acquired.ns);', 'get_time(in.at("arrived_ns"), info.acquired.ns);',
            "When a frame arrived is taken for when it was exposed.", r"^Wire\.AFrameComesAsItWasSent", ("device_wire_test",)),
     Mutant("never-asked", "device/wire/client.cpp",
            "if (now < next_question_) return;", "if (next_question_ < now) return;",
