@@ -21,10 +21,17 @@ template void get_whole(const json& in, int& out);
 template void get_whole(const json& in, std::int64_t& out);
 template void get_whole(const json& in, std::uint64_t& out);
 
+namespace {
+
+bool is_near(std::int64_t ns) {
+  return ns >= -kFarthest_ns && ns <= kFarthest_ns;
+}
+
+}  // namespace
+
 void get_time(const json& in, std::int64_t& ns) {
   get_whole(in, ns);
-  if (ns < -kFarthest_ns || ns > kFarthest_ns)
-    throw json::out_of_range::create(406, "a time within 73 years of zero is wanted", &in);
+  if (!is_near(ns)) throw json::out_of_range::create(406, "a time within 73 years of zero is wanted", &in);
 }
 
 namespace {
@@ -237,7 +244,12 @@ void from_json(const json& in, WallClock& clock) {
   in.at("tai_known").get_to(clock.tai_known);
   get_time(in.at("max_error_ns"), clock.max_error_ns);
   get_time(in.at("est_error_ns"), clock.est_error_ns);
-  get_time(in.at("wall_minus_monotonic_ns"), clock.wall_minus_monotonic_ns);
+  get_whole(in.at("wall_minus_monotonic_ns"), clock.wall_minus_monotonic_ns);
+  // A wall clock that was set to a year far away is not known; the rest of the message is sound.
+  if (!is_near(clock.wall_minus_monotonic_ns)) {
+    clock.known = clock.synchronised = clock.tai_known = false;
+    clock.wall_minus_monotonic_ns = 0;
+  }
   in.at("source").get_to(clock.source);
 }
 

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 #include <sys/timex.h>
 
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "device/wire/clock_discipline.hpp"
+#include "device/wire/json.hpp"
 
 namespace birdseye::wire {
 namespace {
@@ -25,6 +27,18 @@ TEST(ClockDiscipline, IsDecodedFromTheKernelsWords) {
   reading.status = STA_PLL;
   EXPECT_FALSE(decode_discipline(reading, TIME_ERROR).synchronised);
   EXPECT_TRUE(decode_discipline(reading, TIME_INS).synchronised);
+}
+
+/// An appliance whose wall clock was set to the year 2099 goes on serving.
+TEST(WallClock, OneThatIsFarAwayIsNotKnown) {
+  WallClock told{true, true, true, 1000, 100, 4'000'000'000'000'000'000, "kernel"};
+  const auto far = nlohmann::json(told).get<WallClock>();
+  EXPECT_FALSE(far.known || far.synchronised || far.tai_known);
+  EXPECT_EQ(far.wall_minus_monotonic_ns, 0);
+  told.wall_minus_monotonic_ns = 1'800'000'000'000'000'000;
+  const auto near = nlohmann::json(told).get<WallClock>();
+  EXPECT_TRUE(near.known && near.synchronised && near.tai_known);
+  EXPECT_EQ(near.wall_minus_monotonic_ns, told.wall_minus_monotonic_ns);
 }
 
 }  // namespace
