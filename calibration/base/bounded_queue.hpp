@@ -5,7 +5,10 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <string>
 #include <utility>
+
+#include "calibration/base/queue_fill.hpp"
 
 namespace birdseye {
 
@@ -65,6 +68,12 @@ class BoundedQueue {
   }
   /// How many a lane has lost so far.
   [[nodiscard]] std::uint64_t dropped(std::size_t lane) const { return dropped_[lane]; }
+  /// What waits is counted anew, so that a count that went wrong shows. name: of the queue.
+  [[nodiscard]] QueueFill fill(std::size_t lane, std::string name) const {
+    QueueFill out{std::move(name), waiting_[lane].size(), lanes_[lane].capacity, 0, lanes_[lane].bytes};
+    for (const Waiting& one : waiting_[lane]) out.bytes += one.bytes;
+    return out;
+  }
 
  private:
   struct Waiting {

@@ -76,6 +76,12 @@ Result<std::unique_ptr<Appliance>> Appliance::start(const Config& config, wire::
   return appliance;
 }
 
+std::vector<QueueFill> Appliance::fills() const {
+  std::vector<QueueFill> out = queue_.fills();
+  if (recorder_) out.push_back(recorder_->fill());
+  return out;
+}
+
 /// Without a recording the appliance still does its work.
 void Appliance::start_recording() {
   auto started = Recorder::start(config_.record, config_.core);

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <vector>
 
+#include "calibration/base/queue_fill.hpp"
 #include "device/birdseyed/config.hpp"
 #include "device/birdseyed/instrument_thread.hpp"
 #include "device/birdseyed/recorder.hpp"
@@ -31,6 +32,8 @@ class Appliance {
   [[nodiscard]] std::string hanging() const;
   /// The state and what is wrong, for the service manager.
   [[nodiscard]] std::string summary() const;
+  /// Of its queues, but for the server's.
+  [[nodiscard]] std::vector<QueueFill> fills() const;
 
  private:
   Appliance(const Config& config, wire::Server& server);

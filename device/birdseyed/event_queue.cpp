@@ -22,4 +22,9 @@ void EventQueue::push(RawEvent event) {
   }
 }
 
+std::vector<QueueFill> EventQueue::fills() const {
+  return {events_.fill(kFrames, "frames from the camera"), events_.fill(kOthers, "events from the instruments"),
+          events_.fill(kChanges, "changes of the instruments")};
+}
+
 }  // namespace birdseye::device

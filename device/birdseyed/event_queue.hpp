@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <stop_token>
+#include <vector>
 
 #include "device/birdseyed/raw_event.hpp"
 #include "drivers/system/blocking_queue.hpp"
@@ -23,6 +24,7 @@ class EventQueue {
   std::optional<RawEvent> pop(Deadline deadline, const std::stop_token& stop) { return events_.pop(deadline, stop); }
   [[nodiscard]] std::uint64_t frames_dropped() const { return events_.dropped(kFrames); }
   [[nodiscard]] std::uint64_t others_dropped() const { return events_.dropped(kOthers) + events_.dropped(kChanges); }
+  [[nodiscard]] std::vector<QueueFill> fills() const;
 
  private:
   enum Lane : std::size_t { kFrames, kOthers, kChanges, kLanes };

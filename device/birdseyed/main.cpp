@@ -123,7 +123,7 @@ int pair(const fs::path& path, const PairOptions& options) {
                                              std::fflush(stdout);
                                            });
   if (!paired) return refuse(paired.error().with_context("pair"));
-  fmt::print("paired with {}, in {}\n", paired->name, folder->string());
+  print_line(fmt::format("paired with {}, in {}", paired->name, folder->string()));
   return 0;
 }
 
@@ -182,8 +182,8 @@ int main(int argc, char** argv) {
       const char* without = !config->core.field_refused.empty()         ? ", but no pose will be published"
                             : !config->core.calibration_refused.empty() ? ", but the record will not be used"
                                                                         : "";
-      fmt::print("{}: sound{}\n", config_path.string(), without);
-      if (const std::string who = device::admission_words(config->wire); !who.empty()) fmt::print("{}\n", who);
+      print_line(fmt::format("{}: sound{}", config_path.string(), without));
+      if (const std::string who = device::admission_words(config->wire); !who.empty()) print_line(who);
       return 0;
     }
     spdlog::set_default_logger(

@@ -51,6 +51,7 @@ class Recorder::Writer {
   Result<std::filesystem::path> wait_for_begin();
   void take(const RawEvent& event);
   [[nodiscard]] std::string ended() const;
+  [[nodiscard]] QueueFill fill() const;
   /// True once the thread is through with the file; false where it hangs.
   bool stop();
 
@@ -233,6 +234,13 @@ std::string Recorder::Writer::ended() const {
   return ended_;
 }
 
+QueueFill Recorder::Writer::fill() const {
+  const std::lock_guard lock(mutex_);
+  QueueFill out{.queue = "the recording", .values = waiting_.size(), .most_bytes = most_held_bytes_};
+  for (const RawEvent& event : waiting_) out.bytes += size_of(event);
+  return out;
+}
+
 bool Recorder::Writer::stop() {
   std::unique_lock lock(mutex_);
   give_up_ = device_now() + kWriteAfterStop;
@@ -262,6 +270,10 @@ Recorder::~Recorder() {
 
 void Recorder::take(const RawEvent& event) {
   writer_->take(event);
+}
+
+QueueFill Recorder::fill() const {
+  return writer_->fill();
 }
 
 std::string Recorder::text() const {

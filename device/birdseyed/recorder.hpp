@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "calibration/base/queue_fill.hpp"
 #include "device/birdseyed/record_file.hpp"
 #include "device/birdseyed/recording.hpp"
 #include "drivers/system/thread.hpp"
@@ -30,6 +31,8 @@ class Recorder {
   /// The file's path, or why the recording ended.
   [[nodiscard]] std::string text() const;
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  /// Of what waits for the disk.
+  [[nodiscard]] QueueFill fill() const;
 
  private:
   class Writer;

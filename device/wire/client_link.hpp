@@ -55,6 +55,7 @@ class ClientLink {
   [[nodiscard]] bool stuck() const;
 
   [[nodiscard]] std::size_t frames_waiting() const { return waiting_.frames().size(); }
+  [[nodiscard]] std::size_t small_waiting() const { return waiting_.small().size(); }
   std::size_t shed_frame() { return waiting_.shed_frame(); }
   [[nodiscard]] bool sends_frame() const { return sending_ && sending_->kind == Packet::Kind::frame; }
   [[nodiscard]] DeviceTime last_progress() const { return progress_; }

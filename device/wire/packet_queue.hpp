@@ -15,7 +15,8 @@ namespace birdseye::wire {
 class PacketQueue {
  public:
   static constexpr std::size_t kMostFrames = 3;
-  static constexpr std::size_t kMostOfAKind = 256;  ///< of small ones: of poses more than two seconds
+  static constexpr std::size_t kMostOfAKind = 256;                 ///< of small ones: of poses more than two seconds
+  static constexpr std::size_t kMostSmall = 2 * kMostOfAKind + 2;  ///< poses, others; a STATUS and a Calibration
 
   /// Queues a packet and returns how many were shed for it. A STATUS, Calibration or volume replaces the one that
   /// waits, which is then out of date and not counted as shed.
@@ -61,6 +62,7 @@ class PacketQueue {
     return packet;
   }
   [[nodiscard]] const std::deque<Packet>& frames() const { return frames_; }
+  [[nodiscard]] const std::deque<Packet>& small() const { return small_; }
 
  private:
   [[nodiscard]] const std::deque<Packet>& next() const { return small_.empty() ? frames_ : small_; }

@@ -147,6 +147,26 @@ void Server::bound_frames() {
   }
 }
 
+void Server::note_fills() {
+  QueueFill frames{.queue = "frames for the clients",
+                   .most_values = PacketQueue::kMostFrames * clients_.size(),
+                   .bytes = frame_bytes_held(),
+                   .most_bytes = kMostFrameBytesHeld};
+  QueueFill small{.queue = "messages for the clients", .most_values = PacketQueue::kMostSmall * clients_.size()};
+  for (const ClientLink& client : clients_) {
+    frames.values += client.frames_waiting();
+    small.values += client.small_waiting();
+  }
+  const std::lock_guard lock(mutex_);
+  frames_fill_ = std::move(frames);
+  small_fill_ = std::move(small);
+}
+
+std::vector<QueueFill> Server::fills() {
+  const std::lock_guard lock(mutex_);
+  return {frames_fill_, small_fill_};
+}
+
 void Server::answer(ClientLink& client, const Request& request) {
   if (const auto* ping = std::get_if<ClockPing>(&request)) {
     const DeviceTime now = device_now();
@@ -207,7 +227,10 @@ void Server::run(const std::stop_token& stop) {
     for (auto client = clients_.begin(); client != clients_.end(); ++watch) {
       client = serve(*client, *watch) ? std::next(client) : put_out(client);
     }
-    if (frames) bound_frames();
+    if (frames) {
+      bound_frames();
+      note_fills();
+    }
     camera_locked_ = std::ranges::any_of(clients_, &ClientLink::locks_camera);
     if (somebody) accept_one();
   }

@@ -7,7 +7,9 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "calibration/base/queue_fill.hpp"
 #include "calibration/time/rate_limit.hpp"
 #include "device/wire/client_link.hpp"
 #include "device/wire/host_limits.hpp"
@@ -46,6 +48,8 @@ class Server {
   };
   Counters take_counters();
   [[nodiscard]] std::size_t clients() const { return clients_count_; }
+  /// Of what waits for the clients, as it was when packets were last given to them.
+  [[nodiscard]] std::vector<QueueFill> fills();
   /// Whether a connected client wants the camera's controls held.
   [[nodiscard]] bool camera_locked() const { return camera_locked_; }
 
@@ -65,6 +69,7 @@ class Server {
   void bound_frames();
   /// Bytes of all frames held, each frame counted once however many clients hold it.
   [[nodiscard]] std::size_t frame_bytes_held() const;
+  void note_fills();
   /// Sends to a client and reads from it. False: the client is to be disconnected.
   bool serve(ClientLink& client, const LinkWatch& told);
   void answer(ClientLink& client, const Request& request);
@@ -76,6 +81,7 @@ class Server {
   std::atomic<std::uint64_t> messages_shed_ = 0, clients_shed_ = 0, requests_refused_ = 0;
   std::mutex mutex_;
   PacketQueue inbox_;  ///< published, not yet distributed
+  QueueFill frames_fill_, small_fill_;
   Latencies latencies_;
   std::list<ClientLink> clients_;  ///< of the server's thread alone, as is all that follows
   // A new client gets these at once.

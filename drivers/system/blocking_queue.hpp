@@ -5,6 +5,7 @@
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <utility>
 
 #include "calibration/base/bounded_queue.hpp"
@@ -58,6 +59,11 @@ class BlockingQueue {
   [[nodiscard]] std::uint64_t dropped(std::size_t lane) const {
     const std::lock_guard lock(mutex_);
     return queue_.dropped(lane);
+  }
+  /// As BoundedQueue::fill().
+  [[nodiscard]] QueueFill fill(std::size_t lane, std::string name) const {
+    const std::lock_guard lock(mutex_);
+    return queue_.fill(lane, std::move(name));
   }
 
  private:

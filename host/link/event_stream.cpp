@@ -71,6 +71,11 @@ std::string EventStream::peer_words() const {
   return peer_words_;
 }
 
+std::vector<QueueFill> EventStream::fills() const {
+  return {events_.fill(kFrames, "frames for the window"), events_.fill(kPoses, "poses for the window"),
+          events_.fill(kOthers, "messages for the window")};
+}
+
 EventStream::Lane EventStream::lane_of(const wire::Event& event) {
   if (std::holds_alternative<wire::VideoFrame>(event)) return kFrames;
   return std::holds_alternative<wire::Birds>(event) ? kPoses : kOthers;

@@ -4,6 +4,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "device/wire/client.hpp"
 #include "drivers/system/blocking_queue.hpp"
@@ -46,6 +47,8 @@ class EventStream : public EventSource {
   [[nodiscard]] Drops drops() const {
     return {events_.dropped(kFrames), events_.dropped(kPoses) + events_.dropped(kOthers)};
   }
+  /// Of what nobody has taken yet.
+  [[nodiscard]] std::vector<QueueFill> fills() const;
 
  private:
   enum Lane : std::size_t { kFrames, kPoses, kOthers, kLanes };

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "drivers/system/background.hpp"
 #include "drivers/system/clock.hpp"
@@ -46,6 +47,10 @@ class LiveSource {
   /// By the newest frame or pose; empty until that is known. A recorded frame or pose counts as taken at the
   /// moment at which it is played.
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;
+  /// Of what came over the wire and waits.
+  [[nodiscard]] std::vector<QueueFill> fills() const {
+    return stream_ != nullptr ? stream_->fills() : std::vector<QueueFill>();
+  }
   /// The simulated cart, once it runs.
   [[nodiscard]] SimulatedCart* cart() const { return cart_.get(); }
 

@@ -66,6 +66,16 @@ TEST(BoundedQueue, ALargeValuePushesOutAsManyAsItTakesAndIsRefusedWhereItFitsNow
   EXPECT_TRUE(queue.push(0, 7, 100)) << "what was taken or dropped holds nothing";
 }
 
+TEST(BoundedQueue, TellsHowFullALaneIsBesideItsBounds) {
+  BoundedQueue<int, 2> queue({{{3, WhenFull::drop_oldest, 100}, {10}}});
+  queue.push(0, 1, 30);
+  queue.push(0, 2, 40);
+  const QueueFill fill = queue.fill(0, "numbers");
+  EXPECT_EQ(fill.queue, "numbers");
+  EXPECT_THAT((std::vector{fill.values, fill.most_values, fill.bytes, fill.most_bytes}), ElementsAre(2, 3, 70, 100));
+  EXPECT_EQ(queue.fill(1, "others").values, 0U);
+}
+
 TEST(BoundedQueue, WhatIsPushedIsTakenWaitsOrIsCounted) {
   std::mt19937 random(7);
   BoundedQueue<int, 2> queue({{{5, WhenFull::drop_oldest}, {3, WhenFull::refuse}}});
