@@ -8,7 +8,7 @@
 namespace birdseye::hw_sim {
 
 std::string_view fault_name(FaultKind kind) {
-  static constexpr std::array<std::string_view, 42> kNames{"drop_byte",
+  static constexpr std::array<std::string_view, 44> kNames{"drop_byte",
                                                            "duplicate_byte",
                                                            "corrupt_byte",
                                                            "wrong_phase_bit",
@@ -49,7 +49,9 @@ std::string_view fault_name(FaultKind kind) {
                                                            "disk_late",
                                                            "disk_full",
                                                            "power_cut",
-                                                           "appliance_power_cut"};
+                                                           "appliance_power_cut",
+                                                           "appliance_disk_late",
+                                                           "appliance_disk_full"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 

@@ -56,6 +56,8 @@ enum class FaultKind {
   disk_full,
   power_cut,
   appliance_power_cut,
+  appliance_disk_late,
+  appliance_disk_full,
 };
 
 std::string_view fault_name(FaultKind kind);

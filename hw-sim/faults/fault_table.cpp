@@ -69,6 +69,8 @@ constexpr FaultSpec kTable[] = {
     {FaultKind::disk_full, false, false, false, true, WithoutEnd::refused, {}},
     {FaultKind::power_cut, false, false, false, true, WithoutEnd::refused, kCut},
     {FaultKind::appliance_power_cut, false, false, false, true, WithoutEnd::refused, {}},
+    {FaultKind::appliance_disk_late, false, false, false, true, WithoutEnd::refused, kDelayMs},
+    {FaultKind::appliance_disk_full, false, false, false, true, WithoutEnd::refused, {}},
 };
 
 }  // namespace

@@ -226,6 +226,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     }
     const Fault* const late = befalling.active(FaultKind::link_late);
     network.set_late(Duration::from_seconds(late != nullptr ? late->value("ms") * 1e-3 : 0));
+    if (recording != nullptr) recording->befall(befalling, host_now());
     if (befalling.active(FaultKind::appliance_power_cut) != nullptr) appliance.lose_power();
     const bool ends = befalling.active(FaultKind::appliance_restart) != nullptr ||
                       befalling.active(FaultKind::scope_exchanged) != nullptr ||
@@ -238,6 +239,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     if (std::exchange(had_power, *powered) && !*powered) journal.say(host_now(), "the window's machine has no power");
     const auto opened = window.run(*powered && befalling.active(FaultKind::window_restart) == nullptr);
     if (!opened) return out.broken.push_back({journal.at_s(host_now()), "start", opened.error().what});
+    laws.take(appliance.fills(), host_now());
     if (window.workflow() == nullptr) {
       sleep_for(kScreen);
       announcer.tell(journal, host_now());
@@ -245,6 +247,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     }
     host::LiveWorkflow& workflow = *window.workflow();
     host::LiveSource& source = window.source();
+    laws.take(source.fills(), host_now());
     if (*opened) {
       surgeon.stand_at(workflow, journal.at_s(host_now()));
       laws.opened(surgeon.checks());
@@ -324,7 +327,9 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
       add(out.faults.programs, draw_delays(operation.seed, kFaultsFrom_s, until_s));
       if (!at_board) add(out.faults.programs, draw_scope_exchanges(operation.seed, kFaultsFrom_s, until_s));
       if (reference) add(out.faults.world, draw_tilts(operation.seed, kFaultsFrom_s, until_s));
+      if (reference) add(out.faults.world, draw_slips(operation.seed, kFaultsFrom_s, until_s));
       if (records) add(out.faults.programs, draw_appliance_power_cuts(operation.seed, kFaultsFrom_s, until_s));
+      if (records) add(out.faults.programs, draw_appliance_disk_faults(operation.seed, kFaultsFrom_s, until_s));
     }
     if (operation.pictures && !reference) draw_bumps_in_view(operation.seed, kFaultsFrom_s, until_s, out.faults);
     if (operation.pictures && operation.more_befalls)

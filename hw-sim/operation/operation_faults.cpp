@@ -83,9 +83,17 @@ constexpr DrawnFault kDrawnDelays[] = {
 
 constexpr DrawnFault kDrawnTilts[] = {{FaultKind::bed_tilted, kWorld, 10, 90, "deg", -15, 15}};
 
+constexpr DrawnFault kDrawnSlips[] = {{FaultKind::reference_moved, kWorld, 10, 60, "mm", 10, 60}};
+
 constexpr DrawnFault kDrawnOfScopes[] = {{FaultKind::scope_exchanged, kProgram, 2, 20}};
 
 constexpr DrawnFault kDrawnOfAppliance[] = {{FaultKind::appliance_power_cut, kProgram, 2, 20}};
+
+// A later disk would hold an appliance that is ended for as long as it waits at most.
+constexpr DrawnFault kDrawnOfApplianceDisk[] = {
+    {FaultKind::appliance_disk_late, kProgram, 5, 20, "ms", 10, 400},
+    {FaultKind::appliance_disk_full, kProgram, 5, 60},
+};
 
 constexpr DrawnFault kDrawnOfDisk[] = {
     {FaultKind::disk_late, kProgram, 5, 20, "ms", 10, 1500},
@@ -142,9 +150,10 @@ bool starts_appliance(FaultKind kind) {
 namespace {
 
 FaultSigns of_program(const Fault& fault) {
-  if (fault.kind == FaultKind::disk_full) return {.aside = true};
-  if (fault.kind == FaultKind::disk_late) return {};  // a window that is closed waits for it
-  constexpr double kConnects_s = 1.1;                 // the window tries each second
+  if (fault.kind == FaultKind::disk_full || fault.kind == FaultKind::appliance_disk_full) return {.aside = true};
+  // A program that is ended waits for it.
+  if (fault.kind == FaultKind::disk_late || fault.kind == FaultKind::appliance_disk_late) return {};
+  constexpr double kConnects_s = 1.1;  // the window tries each second
   if (fault.kind == FaultKind::link_late) return {.own_s = kConnects_s + fault.value("ms") * 1e-3};
   return {.own_s = kConnects_s + (starts_appliance(fault.kind) ? kFlockStarts_s : 0)};
 }
@@ -266,12 +275,20 @@ std::vector<Fault> draw_appliance_power_cuts(std::uint64_t seed, double from_s, 
   return all_drawn(kDrawnOfAppliance, hashed_word(seed, 17), 200, from_s, until_s);
 }
 
+std::vector<Fault> draw_appliance_disk_faults(std::uint64_t seed, double from_s, double until_s) {
+  return all_drawn(kDrawnOfApplianceDisk, hashed_word(seed, 20), 150, from_s, until_s);
+}
+
 std::vector<Fault> draw_delays(std::uint64_t seed, double from_s, double until_s) {
   return all_drawn(kDrawnDelays, hashed_word(seed, 14), 100, from_s, until_s);
 }
 
 std::vector<Fault> draw_tilts(std::uint64_t seed, double from_s, double until_s) {
   return all_drawn(kDrawnTilts, hashed_word(seed, 15), 200, from_s, until_s);
+}
+
+std::vector<Fault> draw_slips(std::uint64_t seed, double from_s, double until_s) {
+  return all_drawn(kDrawnSlips, hashed_word(seed, 21), 250, from_s, until_s);
 }
 
 std::vector<Fault> draw_disk_faults(std::uint64_t seed, double from_s, double until_s) {

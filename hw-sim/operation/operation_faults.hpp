@@ -50,10 +50,14 @@ std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double
 std::vector<Fault> draw_delays(std::uint64_t seed, double from_s, double until_s);
 /// With a reference bird: the table is tilted.
 std::vector<Fault> draw_tilts(std::uint64_t seed, double from_s, double until_s);
+/// With a reference bird: it slips on what it is fixed to, in a tenth of a second.
+std::vector<Fault> draw_slips(std::uint64_t seed, double from_s, double until_s);
 /// The scope is exchanged for another, and for the first again.
 std::vector<Fault> draw_scope_exchanges(std::uint64_t seed, double from_s, double until_s);
 /// The appliance loses its power.
 std::vector<Fault> draw_appliance_power_cuts(std::uint64_t seed, double from_s, double until_s);
+/// The disk that the appliance records to is late, or full.
+std::vector<Fault> draw_appliance_disk_faults(std::uint64_t seed, double from_s, double until_s);
 /// What befalls the machine of the window: its disk is late, or full, or its power is cut.
 std::vector<Fault> draw_disk_faults(std::uint64_t seed, double from_s, double until_s);
 

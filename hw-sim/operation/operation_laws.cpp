@@ -278,6 +278,19 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
   judge_registration_kept(view, now_s);
 }
 
+void OperationLaws::take(std::span<const QueueFill> queues, HostTime now) {
+  const auto judge = [&](const QueueFill& queue, std::size_t held, std::size_t most, const char* of) {
+    if (held > most)
+      break_law(at_s(now.ns), "queues", fmt::format("{}: {} {} wait, of at most {}", queue.queue, held, of, most));
+    if (held > 0)
+      figures_.fullest_queue = std::max(figures_.fullest_queue, static_cast<double>(held) / static_cast<double>(most));
+  };
+  for (const QueueFill& queue : queues) {
+    judge(queue, queue.values, queue.most_values, "values");
+    judge(queue, queue.bytes, queue.most_bytes, "bytes");
+  }
+}
+
 void OperationLaws::take_memory(std::size_t bytes, HostTime now) {
   const double now_s = at_s(now.ns);
   if (now_s < settles_s_) {

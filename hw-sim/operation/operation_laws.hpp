@@ -5,9 +5,11 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "calibration/base/queue_fill.hpp"
 #include "calibration/time/clock.hpp"
 #include "device/wire/messages.hpp"
 #include "host/operation/live_workflow.hpp"
@@ -47,7 +49,8 @@ struct BrokenLaw {
 ///   something was not kept, or what it had later: the registration with its deformation, and the calibration over the
 ///   board. It draws nothing before a landmark has been checked. What was taken back, and nothing else was kept, it
 ///   does not take up. A window that cannot keep something says so within 2 s.
-/// - recorded: what the appliance records is as OperationRecording says. (Judged there.)
+/// - recorded: OperationRecording has it, and judges it.
+/// - queues: none holds more than its bound, in values or in bytes.
 /// - memory: it does not grow later than two minutes after the beginning, and 30 s after the first matching of the CT
 ///   with the video begins.
 class OperationLaws {
@@ -68,6 +71,8 @@ class OperationLaws {
   void take(const host::OperationView& view, std::size_t checks, HostTime now);
   /// The same, of a disk on which so many syncs have failed so far. powerless: it keeps nothing more.
   void take_kept(const host::OperationView& view, std::uint64_t failed_syncs, bool powerless, HostTime now);
+  /// Of the programs' queues.
+  void take(std::span<const QueueFill> queues, HostTime now);
   /// What all programs together hold.
   void take_memory(std::size_t bytes, HostTime now);
   /// What is on the screen.
@@ -86,6 +91,7 @@ class OperationLaws {
     double worst_pose = 0;     ///< of a pose, in parts of what it may be off
     double worst_age_ms = 0;   ///< of an overlay
     double worst_circles = 0;  ///< of a green overlay
+    double fullest_queue = 0;  ///< in parts of its bound
     std::uint64_t faults = 0, faults_judged = 0;
     std::uint64_t moved = 0, moved_unwatched = 0;    ///< how often transmitter or patient were, without a reference
     double slowest_named_s = 0, slowest_over_s = 0;  ///< less what the fault's signs allow

@@ -1,5 +1,8 @@
 #include "hw-sim/operation/operation_programs.hpp"
 
+#include <algorithm>
+#include <iterator>
+
 #include "device/wire/client.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/disk_keeper.hpp"
@@ -54,6 +57,13 @@ void ApplianceProgram::lose_power() {
   if (appliance_ == nullptr) return;
   network_.fall_silent();
   if (recording_ != nullptr) recording_->lose_power(host_now());
+}
+
+std::vector<QueueFill> ApplianceProgram::fills() const {
+  if (appliance_ == nullptr) return {};
+  std::vector<QueueFill> out = appliance_->fills();
+  std::ranges::move(server_->fills(), std::back_inserter(out));
+  return out;
 }
 
 Result<bool> WindowProgram::run(bool on) {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "calibration/base/result.hpp"
 #include "device/birdseyed/appliance.hpp"
@@ -32,6 +33,8 @@ class ApplianceProgram {
   Result<void> run(bool on, std::size_t scope);
   /// Its machine loses its power, where it runs. It has to be ended then.
   void lose_power();
+  /// Of all its queues.
+  [[nodiscard]] std::vector<QueueFill> fills() const;
 
  private:
   device::Config config_;

@@ -26,7 +26,7 @@ namespace {
 
 constexpr double kWithFrames = 0.5;  // of recordings
 constexpr double kMost_gb = 0.02;    // 20 MB: half a minute with frames, an hour without
-constexpr Duration kMayLose = Duration::from_ms(1000);
+constexpr Duration kMayLose = Duration::from_ms(1000), kSaidWithin = Duration::from_ms(2000);
 
 std::uint64_t hash_of(const std::vector<std::uint8_t>& bytes, std::uint64_t hash) {
   std::uint64_t word = 0;
@@ -89,12 +89,34 @@ OperationRecording::OperationRecording(std::filesystem::path folder, std::uint64
   config_.frames = hashed_uniform(seed, 0) < kWithFrames;
   config_.most_gb = kMost_gb;
   config_.create = [this](const auto&) {
-    begun_ = host_now();
-    return disk_.create();
+    auto created = disk_.create();
+    if (created) begun_ = host_now();
+    return created;
   };
 }
 
+void OperationRecording::befall(const FaultTimeline& befalling, HostTime now) {
+  const Fault* const late = befalling.active(FaultKind::appliance_disk_late);
+  const auto takes = Duration::from_seconds(late != nullptr ? late->value("ms") * 1e-3 : 0);
+  late_ = std::max(late_, takes);
+  disk_.set_late(takes);
+  const bool full = befalling.active(FaultKind::appliance_disk_full) != nullptr;
+  if (full && begun_ && !full_) full_ = now;
+  disk_.set_full(full);
+}
+
+/// Whether the appliance says that its recording has ended.
+void OperationRecording::listen(const wire::Event& event, HostTime now) {
+  const auto* const birds = std::get_if<wire::Birds>(&event);
+  // The clocks of host and appliance are one here.
+  if (full_ && !wrote_ && birds != nullptr && birds->acquired.ns > full_->ns) wrote_ = now;
+  const auto* const health = std::get_if<wire::Health>(&event);
+  if (health == nullptr || !wrote_ || now - *wrote_ < kSaidWithin) return;
+  unsaid_ = unsaid_ || health->recording.find("ended") == std::string::npos;
+}
+
 void OperationRecording::take(const wire::Event& event, HostTime now) {
+  listen(event, now);
   if (!config_.frames && is_of_camera(event)) return;
   const auto packed = pack(event);
   // A late network may still bring what the appliance said that ran before.
@@ -119,20 +141,27 @@ std::string OperationRecording::judge() {
   found_ = {};
   cut_.reset();
   begun_.reset();
+  full_.reset();
+  wrote_.reset();
+  unsaid_ = false;
+  late_ = Duration{0};
   return wrong;
 }
 
 std::string OperationRecording::wrong_with_last() {
-  std::optional<HostTime> until;  // empty: to the end
-  if (cut_) until = *cut_ - kMayLose;
+  if (unsaid_) return "the disk was full, and the appliance has not said within 2 s that the recording has ended";
+  const Duration waited{2 * late_.ns};  // for the sync in which it came, and the next
+  std::optional<HostTime> until;        // empty: to the end
+  if (cut_) until = *cut_ - kMayLose - waited;
+  if (full_) until = std::min(until.value_or(*full_), *full_ - waited);
   const auto last = replay();
-  if (!last && !cut_) return last.error().what;  // the power may go in the middle of a block, or before there is one
+  // The power may go, or the disk be full, in the middle of a block, or before there is one.
+  if (!last && !until) return last.error().what;
   std::error_code failed;
   const auto bytes = static_cast<double>(std::filesystem::file_size(disk_.last(), failed));
-  // The clocks of host and appliance are one here.
   if (last && bytes > kMost_gb * 1e9) until = std::min(until.value_or(HostTime{last->ns}), HostTime{last->ns});
   if (auto wrong = missing(until); !wrong.empty()) return wrong;
-  return cut_ ? "" : unsigned_words();
+  return cut_ || full_ ? "" : unsigned_words();
 }
 
 Result<DeviceTime> OperationRecording::replay() {

@@ -10,12 +10,14 @@
 
 #include "device/birdseyed/record_file.hpp"
 #include "device/wire/messages.hpp"
+#include "hw-sim/faults/fault.hpp"
 #include "hw-sim/operation/recordings_disk.hpp"
 
 namespace birdseye::hw_sim {
 
 /// The law of what an appliance records: played again, it gives to the byte what reached the host, in that order. Of an
-/// appliance that lost its power, all that reached the host more than a second before.
+/// appliance that lost its power, all that reached the host more than a second before, and twice what a sync took then.
+/// Where the disk was full, all that came before that; and the appliance says within 2 s that the recording has ended.
 class OperationRecording {
  public:
   OperationRecording(std::filesystem::path folder, std::uint64_t seed);
@@ -24,6 +26,8 @@ class OperationRecording {
   [[nodiscard]] const device::RecordConfig& config() const { return config_; }
   /// An event as it reached the host.
   void take(const wire::Event& event, HostTime now);
+  /// What befalls its disk now.
+  void befall(const FaultTimeline& befalling, HostTime now);
   void lose_power(HostTime now);
   /// The appliance has ended: what is wrong with its recording, in words; empty: nothing. The next one's is another.
   std::string judge();
@@ -37,6 +41,7 @@ class OperationRecording {
     HostTime at;
     std::uint64_t hash;  ///< of its bytes
   };
+  void listen(const wire::Event& event, HostTime now);
   [[nodiscard]] std::string wrong_with_last();
   /// Finds what was seen again. The time of the recording's last event, or why it could not be read to its end.
   [[nodiscard]] Result<DeviceTime> replay();
@@ -50,6 +55,10 @@ class OperationRecording {
   std::array<std::deque<Seen>, std::variant_size_v<wire::Event>> seen_;  ///< by kind
   std::array<std::size_t, std::variant_size_v<wire::Event>> found_{};    ///< of those, in their order
   std::optional<HostTime> begun_, cut_;
+  std::optional<HostTime> full_;   ///< since then the disk has been full, or was
+  std::optional<HostTime> wrote_;  ///< something was to be written since
+  bool unsaid_ = false;            ///< later than 2 s after that nobody has said that the recording has ended
+  Duration late_{0};               ///< that a sync took at most
   std::uint64_t judged_ = 0, found_again_ = 0;
 };
 

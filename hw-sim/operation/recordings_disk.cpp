@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "drivers/system/wait.hpp"
 #include "hw-sim/base/hashed.hpp"
 
 namespace birdseye::hw_sim {
@@ -23,18 +24,22 @@ namespace {
 
 class FileOfDisk final : public device::RecordFile {
  public:
-  explicit FileOfDisk(std::shared_ptr<RecordingsDisk::Written> written) : written_(std::move(written)) {}
+  FileOfDisk(std::shared_ptr<RecordingsDisk::Written> written, std::shared_ptr<const RecordingsDisk::State> disk)
+      : written_(std::move(written)), disk_(std::move(disk)) {}
   ~FileOfDisk() override { written_->out.flush(); }
   FileOfDisk(const FileOfDisk&) = delete;
   FileOfDisk& operator=(const FileOfDisk&) = delete;
 
   int write(std::span<const std::uint8_t> bytes) override {
     if (written_->powerless) return 0;
-    written_->out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    written_->bytes += bytes.size();
+    const auto taken = disk_->full ? bytes.first(bytes.size() / 2) : bytes;
+    written_->out.write(reinterpret_cast<const char*>(taken.data()), static_cast<std::streamsize>(taken.size()));
+    written_->bytes += taken.size();
+    if (disk_->full) return ENOSPC;
     return written_->out ? 0 : EIO;
   }
   int sync() override {
+    if (disk_->late.ns > 0) sleep_for(disk_->late);
     if (written_->powerless) return 0;
     written_->out.flush();
     written_->synced_bytes = written_->bytes;
@@ -43,6 +48,7 @@ class FileOfDisk final : public device::RecordFile {
 
  private:
   std::shared_ptr<RecordingsDisk::Written> written_;
+  std::shared_ptr<const RecordingsDisk::State> disk_;
 };
 
 }  // namespace
@@ -51,11 +57,12 @@ RecordingsDisk::RecordingsDisk(std::filesystem::path folder, ThisMachine machine
     : folder_(std::move(folder)), machine_(std::move(machine)), seed_(seed) {}
 
 Result<device::NewRecordFile> RecordingsDisk::create() {
+  if (state_->full) return Error{Errc::io, folder_.string() + ": no file can be begun; is the disk full?"};
   last_ = folder_ / fmt::format("{}.berec", begun_++);
   written_ = std::make_shared<Written>();
   written_->out.open(last_, std::ios::binary);
   if (!written_->out) return Error{Errc::io, last_.string() + ": cannot be written; is the disk full?"};
-  return device::NewRecordFile{std::make_unique<FileOfDisk>(written_), last_, machine_};
+  return device::NewRecordFile{std::make_unique<FileOfDisk>(written_, state_), last_, machine_};
 }
 
 void RecordingsDisk::lose_power() {

@@ -183,8 +183,12 @@ MUTANTS = (
            "constexpr Duration kSyncEvery = Duration::from_ms(5000);",
            "A power cut of the appliance loses five seconds of its recording, not one.",
            r"^OperationRecording\.APowerCutOfTheAppliance", OPERATION),
-    # What no campaign can see: no lock is in it, nor the names of an appliance's disk, no queue is full, and the latency
-    # is none.
+    Mutant("overfull-queue", "calibration/base/bounded_queue.hpp",
+           "while (!has_room(lane, waiting_[lane].size(), 0))", "while (!has_room(lane, waiting_[lane].size() - 1, 0))",
+           "A queue holds one more than it should.", r"^BoundedQueue\.|^Operation\.AWindowThatStoodStill",
+           ("calibration_test",) + OPERATION),
+    # What no campaign can see: no lock is in it, nor the names of an appliance's disk, nor a queue that holds less, and
+    # the latency is none.
     Mutant("folder-fsync", "device/birdseyed/record_file.cpp",
            "bool named_ = false;", "bool named_ = true;",
            "A recording's name is never brought onto the disk.", r"^Recorder\.KeepsEverythingItIsGiven", BIRDSEYED, False),

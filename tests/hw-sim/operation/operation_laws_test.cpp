@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -56,6 +57,20 @@ TEST_F(Laws, APoseThatIsTurnedByMoreThanItMayBeIsFound) {
   laws_.take(turned(3), HostTime{1'020'000'000});
   ASSERT_EQ(laws_.broken().size(), 1U);
   EXPECT_EQ(laws_.broken().front().law, "pose");
+}
+
+TEST_F(Laws, AQueueThatHoldsMoreThanItsBoundIsFound) {
+  const auto holds = [&](std::size_t values, std::size_t bytes) {
+    const QueueFill fill{"poses", values, 256, bytes, 1'000'000};
+    laws_.take(std::span(&fill, 1), HostTime{1'000'000'000});
+    return laws_.broken().size();
+  };
+  EXPECT_EQ(holds(128, 1'000'000), 0U);
+  EXPECT_EQ(laws_.figures().fullest_queue, 1);
+  EXPECT_EQ(holds(257, 1'000'000), 1U);
+  EXPECT_EQ(holds(256, 1'000'001), 2U);
+  EXPECT_EQ(laws_.broken().back().law, "queues");
+  EXPECT_EQ(laws_.broken().back().what, "poses: 1000001 bytes wait, of at most 1000000");
 }
 
 TEST_F(Laws, MemoryThatGrowsOnIsFound) {

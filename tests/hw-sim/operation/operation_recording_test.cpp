@@ -32,6 +32,26 @@ TEST(OperationRecording, APowerCutOfTheApplianceIsSurvivedByAllButTheLastSecond)
   EXPECT_NE(out.log.find("the overlay is whole", out.log.find("ends: program appliance_power_cut")), std::string::npos);
 }
 
+TEST(OperationRecording, ADiskThatIsLateLosesNothing) {
+  const auto script = programs_end(
+      {usual(FaultKind::appliance_disk_late, 45, 20, {{"ms", 400}}), usual(FaultKind::appliance_restart, 60, 3)});
+  const OperationOutcome out = operate({.seed = 13, .minutes = 1.5, .faults = script, .records = true});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.recordings, 2U);
+  EXPECT_GT(out.found_again, 3000U);
+}
+
+/// The next recording cannot be begun either; the one after it can.
+TEST(OperationRecording, ADiskThatIsFullEndsTheRecordingAndNothingElse) {
+  const auto script =
+      programs_end({usual(FaultKind::appliance_disk_full, 45, 15), usual(FaultKind::appliance_restart, 55, 3),
+                    usual(FaultKind::appliance_restart, 70, 3)});
+  const OperationOutcome out = operate({.seed = 13, .minutes = 1.5, .faults = script, .records = true});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.recordings, 2U);
+  EXPECT_GT(static_cast<double>(out.laws.green), 0.4 * static_cast<double>(out.laws.shown)) << out.log;
+}
+
 /// What an appliance records whose pedal is pressed.
 class Recorded : public ::testing::Test {
  protected:
@@ -56,6 +76,12 @@ class Recorded : public ::testing::Test {
   void put(const device::Bytes& bytes) {
     EXPECT_EQ(file_->write(bytes), 0);
     sum_.add(bytes);
+  }
+  void befall(FaultKind kind) {
+    FaultTimeline befalling({usual(kind, 0, 10)}, FaultTarget::program);
+    befalling.begin(0);
+    befalling.advance(1'000'000'000);
+    law_.befall(befalling, host_now());
   }
   std::string judged() {
     file_.reset();
@@ -94,6 +120,31 @@ TEST_F(Recorded, MayLackTheLastSecondBeforeAPowerCutAndNoMore) {
   press(true);
   law_.lose_power(host_now());
   EXPECT_EQ(judged(), "");
+}
+
+TEST_F(Recorded, MayLackWhatCameOnceTheDiskWasFull) {
+  press(true);
+  befall(FaultKind::appliance_disk_full);
+  press(false);
+  EXPECT_EQ(judged(), "");
+}
+
+TEST_F(Recorded, IsToldToLackWhatCameBeforeTheDiskWasFull) {
+  press(false);
+  befall(FaultKind::appliance_disk_full);
+  EXPECT_NE(judged().find("of 1 events of kind 4 that reached the host, the recording gives 0 again"),
+            std::string::npos);
+}
+
+TEST_F(Recorded, IsToldWhereNobodySaysThatTheDiskIsFull) {
+  befall(FaultKind::appliance_disk_full);
+  const HostTime now = host_now();
+  sleep_for(Duration::from_ms(2));
+  law_.take(wire::Birds{device_now(), {}}, now);
+  wire::Health health;
+  health.recording = "/records/1.berec";
+  law_.take(health, now + Duration::from_ms(2500));
+  EXPECT_EQ(judged(), "the disk was full, and the appliance has not said within 2 s that the recording has ended");
 }
 
 TEST_F(Recorded, IsToldWhereMoreThanTheLastSecondIsLost) {

@@ -66,6 +66,7 @@ TEST(Operation, AWindowThatStoodStillBringsNoOldOverlay) {
   const auto script = programs_end({usual(FaultKind::window_stalls, 45, 0.4), usual(FaultKind::window_stalls, 50, 8)});
   const OperationOutcome out = operate({.seed = 11, .minutes = 1.5, .faults = script});
   EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.laws.fullest_queue, 1) << "of the frames for the window";
   EXPECT_EQ(out.registrations, 1U) << out.log;
   EXPECT_GT(static_cast<double>(out.laws.green), 0.6 * static_cast<double>(out.laws.shown)) << out.log;
 }
@@ -391,9 +392,9 @@ TEST(OperationFaults, EveryFaultOfAnInstrumentCanBefall) {
     const FaultScript script = draw_faults(seed, 0, 3600, true);
     for (const Fault& fault : script.tracker) drawn.push_back("tracker " + std::string(fault_name(fault.kind)));
     for (const Fault& fault : script.camera) drawn.push_back("camera " + std::string(fault_name(fault.kind)));
-    for (const auto& faults :
-         {draw_program_faults(seed, 0, 3600), draw_delays(seed, 0, 3600), draw_scope_exchanges(seed, 0, 3600),
-          draw_disk_faults(seed, 0, 3600), draw_appliance_power_cuts(seed, 0, 3600)})
+    for (const auto& faults : {draw_program_faults(seed, 0, 3600), draw_delays(seed, 0, 3600),
+                               draw_scope_exchanges(seed, 0, 3600), draw_disk_faults(seed, 0, 3600),
+                               draw_appliance_power_cuts(seed, 0, 3600), draw_appliance_disk_faults(seed, 0, 3600)})
       for (const Fault& fault : faults) drawn.push_back("program " + std::string(fault_name(fault.kind)));
   }
   for (const FaultSpec& spec : fault_table()) {
