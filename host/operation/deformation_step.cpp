@@ -129,10 +129,11 @@ bool DeformationStep::tick() {
     note_ = {false, with_touches(verdict.reasons.front(), registration.touches)};
     return false;
   }
-  with_care_ = verdict.grade == Grade::marginal;
+  const bool with_care = verdict.grade == Grade::marginal;
   const std::string& reason = verdict.reasons.front();
-  note_ = {true, with_touches(with_care_ ? words("note_with_care", reason) : reason, registration.touches)};
+  note_ = {true, with_touches(with_care ? words("note_with_care", reason) : reason, registration.touches)};
   DeformedOrgan organ{std::move(registration.field), std::nullopt, std::nullopt, utc_now()};
+  if (with_care) organ.care = reason;
   if (const auto& expected = registration.expected) {
     if (expected->seen) organ.seen_rms_mm = expected->seen->rms_mm;
     if (!expected->targets.empty())
@@ -146,7 +147,6 @@ bool DeformationStep::tick() {
 
 void DeformationStep::undo() {
   found_.reset();
-  with_care_ = false;
   note_ = {false, words("note_undone")};
 }
 
@@ -154,15 +154,13 @@ bool DeformationStep::forget() {
   dropped_ = running();
   cancel();
   (void)matching_.take();  // ended, and not looked at yet
-  with_care_ = false;
   note_ = {};
   return std::exchange(found_, nullptr) != nullptr;
 }
 
 void DeformationStep::take_up(std::shared_ptr<const DeformedOrgan> kept, const std::string& line) {
   found_ = std::move(kept);
-  with_care_ = false;
-  note_ = {true, line};
+  note_ = {true, with_care() ? words("note_taken_up_with_care", line, found_->care) : line};
 }
 
 }  // namespace birdseye::host

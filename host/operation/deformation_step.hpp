@@ -49,7 +49,7 @@ class DeformationStep {
   [[nodiscard]] std::string progress() const { return matching_.line(); }
   [[nodiscard]] const StepNote& note() const { return note_; }
   /// What was found is to be used with care: the note says why.
-  [[nodiscard]] bool with_care() const { return with_care_; }
+  [[nodiscard]] bool with_care() const { return found_ && !found_->care.empty(); }
 
  private:
   /// What the thread found, and whether it may be believed.
@@ -70,7 +70,6 @@ class DeformationStep {
   std::shared_ptr<const DeformedOrgan> found_;
   std::vector<Transform<Camera, Patient>> adjusted_;
   StepNote note_;
-  bool with_care_ = false;
   bool dropped_ = false;  ///< what is being found is by a setup that is no more
   Background<Result<Matched>> matching_;
 };

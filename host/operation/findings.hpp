@@ -45,6 +45,7 @@ struct DeformedOrgan {
   std::optional<double> seen_rms_mm;  ///< to be expected of the surface that the views see, of three axes together
   std::optional<MotionError> target;
   std::string made_utc{};
+  std::string care{};  ///< why it is to be used with care; empty: it passed
 };
 
 struct TouchFit {

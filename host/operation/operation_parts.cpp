@@ -120,6 +120,7 @@ Json json_of(const DeformedOrgan& found) {
             {"patient_from_lattice", rows_of(field.patient_from_lattice.matrix())},
             {"displacement_mm_float32_zlib_base64", packed_floats(values)}};
   enter(json, "seen_rms_mm", found.seen_rms_mm);
+  if (!found.care.empty()) json["with_care"] = found.care;
   if (found.target) json["target"] = {{"rms_mm", found.target->rms_mm}, {"radius95_mm", found.target->radius95_mm}};
   return json;
 }
@@ -189,6 +190,7 @@ Result<DeformedOrgan> deformed_of(const Json& json) {
   field.patient_from_lattice.matrix() = matrix_of<Eigen::Matrix4d>(json.at("patient_from_lattice"));
   if (auto sound = check_sound(field); !sound) return sound.error();
   out.seen_rms_mm = figure_of(json, "seen_rms_mm");
+  out.care = json.value("with_care", "");
   if (json.contains("target")) {
     const Json& target = json.at("target");
     out.target = {target.at("rms_mm").get<double>(), target.at("radius95_mm").get<double>()};

@@ -395,6 +395,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"note_surface", "surface: {}"},
     {"note_nothing_kept", "{}. What is found now is not kept; close the window, and start it with another --out"},
     {"note_not_kept", "not kept: {}"},
+    {"note_taken_up_with_care", "{}, with care: {}"},
     {"note_with_care", "with care: {}"},
     {"note_places_touched", "{} places touched"},
     {"note_tried_again", "{}; it is tried again every second"},

@@ -251,5 +251,18 @@ TEST(DeformationStep, WhatIsTakenUpCanBeUndone) {
   EXPECT_FALSE(step.forget());
 }
 
+TEST(DeformationStep, WhatWasFoundWithCareIsTakenUpWithCare) {
+  DeformedOrgan found;
+  found.care = "the target may be off by 4.1 mm";
+  DeformationStep step;
+  step.take_up(std::make_shared<const DeformedOrgan>(found), "taken up");
+  EXPECT_TRUE(step.with_care());
+  EXPECT_EQ(step.note().line, "taken up, with care: the target may be off by 4.1 mm");
+  step.undo();
+  EXPECT_FALSE(step.with_care());
+  step.take_up(std::make_shared<const DeformedOrgan>(), "taken up");
+  EXPECT_FALSE(step.with_care());
+}
+
 }  // namespace
 }  // namespace birdseye::host

@@ -50,8 +50,8 @@ Operation whole_operation() {
   field.size = {3, 2, 2};
   for (int i = 0; i < 12; ++i) field.displacement_mm.emplace_back(0.1F * static_cast<float>(i % 5), -1.0F / 3, 0.0F);
   field.patient_from_lattice = Eigen::Translation3d(-50, -50, -50) * Eigen::Scaling(100.0);
-  out.deformed =
-      std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}, "2026-11-22T09:55:00Z"});
+  out.deformed = std::make_shared<const DeformedOrgan>(
+      DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}, "2026-11-22T09:55:00Z", "few views"});
   return out;
 }
 
@@ -81,6 +81,7 @@ TEST(Operation, IsReadBackToTheBit) {
   EXPECT_EQ(read->deformed->field.displacement_mm, kept.deformed->field.displacement_mm);
   EXPECT_EQ(read->deformed->field.patient_from_lattice.matrix(), kept.deformed->field.patient_from_lattice.matrix());
   EXPECT_EQ(read->deformed->target->radius95_mm, 1.2);
+  EXPECT_EQ(read->deformed->care, "few views");
   EXPECT_TRUE(read_operation(scratch / "operation.json")) << "the file itself is named as well as its folder";
 }
 
