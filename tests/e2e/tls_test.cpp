@@ -135,12 +135,13 @@ std::string line_of(const std::string& output, const std::string& beginning) {
 
 TEST_F(Beyond, PeopleWhoCompareTheCodeIntroduceTwoMachinesToARunningAppliance) {
   start();
-  const int port = (*wire::Server::listen("127.0.0.1", 0))->port();
   testing::Child cart({"sh", "-c",
                        "echo y | BIRDSEYE_IDENTITY=" + cart_folder_ + " " + testing::programs_folder() +
-                           "/birdseyed pair --name host-1 --port " + std::to_string(port) + " --config " + config("")});
-  ASSERT_TRUE(cart.says({"for two minutes: "}, Deadline::after(Duration::from_ms(20'000)))) << cart.output();
-  const auto host = testing::run("birdseye", "pair " + address_ + ":" + std::to_string(port) + " --name cart-1",
+                           "/birdseyed pair --name host-1 --port 0 --config " + config("")});
+  const std::string asks = "for two minutes: birdseye pair THIS_MACHINE:";
+  ASSERT_TRUE(cart.says({asks}, Deadline::after(Duration::from_ms(20'000)))) << cart.output();
+  const std::string port = line_of(cart.output(), asks).substr(asks.size());
+  const auto host = testing::run("birdseye", "pair " + address_ + ":" + port + " --name cart-1",
                                  "echo y | env BIRDSEYE_IDENTITY=" + host_folder_);
   EXPECT_EQ(host.code, 0) << host.output;
   EXPECT_NE(host.output.find("paired with cart-1, in "), std::string::npos) << host.output;
