@@ -182,8 +182,10 @@ Result<void> RecordingReader::make_events(std::size_t number, const SequenceHead
   frame.info.sequence = countable ? static_cast<std::uint64_t>(counted.value) : number;
   frame.info.acquired = frame.info.arrived = acquired;
   // As RecordingWriter has them; PLUS says nothing of the kind.
-  if (const auto sigma = span_in(value_of(fields, "TimestampSigma"))) frame.info.acquired_sigma = *sigma;
-  if (const ReadNumber sigma_mm = read_number(value_of(fields, "PoseSigmaMm")); sigma_mm.problem.empty())
+  if (const auto sigma = span_in(value_of(fields, "TimestampSigma")); sigma && sigma->ns >= 0)
+    frame.info.acquired_sigma = *sigma;
+  if (const ReadNumber sigma_mm = read_number(value_of(fields, "PoseSigmaMm"));
+      sigma_mm.problem.empty() && sigma_mm.value >= 0)
     frame.info.pose.position_sigma_mm = sigma_mm.value;
   frame.info.latency = span_in(value_of(fields, "Latency"));
   frame.width_px = sequence_->width_px();
