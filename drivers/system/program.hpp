@@ -31,6 +31,8 @@ int run_program(App& app, int argc, char** argv, const Finish& finish) {
   constexpr int kUnusable = static_cast<int>(ExitCode::unusable_input);
   // Whoever reads our pipes may go first. Writing then fails with an error, which is said; it does not end us unheard.
   ::signal(SIGPIPE, SIG_IGN);
+  // A limit on the size of files (ulimit -f) is told as a full disk is.
+  ::signal(SIGXFSZ, SIG_IGN);
   const std::string name = app.get_name();
   app.failure_message(
       [name](const App*, const auto& error) { return name + ": " + error.what() + "; --help says what there is\n"; });

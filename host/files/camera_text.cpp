@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 #include <set>
+#include <string_view>
 #include <vector>
 
 #include "host/files/stored_matrix.hpp"
@@ -96,7 +97,23 @@ std::string twice_in(const cv::FileNode& map, int deeper = 1) {
   return {};
 }
 
+/// A picture's width or height that begins with 0, which OpenCV counts by eights. Empty where there is none.
+std::string octal_size(const std::string& text) {
+  constexpr std::string_view kDigits = "0123456789";
+  for (const std::string_view key : {"image_width", "image_height"}) {
+    for (auto at = text.find(key); at != std::string::npos; at = text.find(key, at + 1)) {
+      const auto from = std::min(text.find_first_not_of(" \t\r\n\":>+-", at + key.size()), text.size());
+      const auto end = std::min(text.find_first_not_of(kDigits, from), text.size());
+      if (end - from > 1 && text[from] == '0') return text.substr(from, end - from);
+    }
+  }
+  return {};
+}
+
 Result<CameraModel> opencv_camera(const std::string& text) {
+  if (const std::string number = octal_size(text); !number.empty())
+    return Error{Errc::bad_value,
+                 fmt::format("has a picture of {} px; write the number without the 0 before it", number.substr(0, 40))};
   if (const std::string number = beyond_int(text); !number.empty()) {
     return Error{Errc::bad_value,
                  fmt::format("has the whole number {}, which OpenCV takes for another; mend it, or put it in quotes "
@@ -124,30 +141,71 @@ Result<CameraModel> opencv_camera(const std::string& text) {
   return camera;
 }
 
-/// Numbers under the first of the keys that is there; of a matrix, its data. Nothing where none is there.
+/// A decimal whole number: yaml-cpp itself takes 064 for 52.
+int whole_of(const YAML::Node& node) {
+  const std::string& text = node.Scalar();
+  int value = 0;
+  const char* const end = text.data() + text.size();
+  const auto [rest, failed] = std::from_chars(text.data() + (text.starts_with('+') ? 1 : 0), end, value);
+  if (failed != std::errc() || rest != end)
+    throw YAML::RepresentationException(node.Mark(), "a whole decimal number belongs there");
+  return value;
+}
+
+/// Numbers of a list; of a matrix, its data; of a word, the whole number that it is.
+Numbers numbers_of(const YAML::Node& node) {
+  if (node.IsScalar()) return {static_cast<double>(whole_of(node))};
+  return (node.IsMap() ? node["data"] : node).as<Numbers>();
+}
+
+/// Numbers under the first of the keys that is there. Nothing where none is there.
 std::optional<Numbers> numbers_under(const YAML::Node& node, std::initializer_list<const char*> keys) {
   for (const char* key : keys) {
-    const YAML::Node found = node[key];
-    if (!found) continue;
-    return (found.IsMap() ? found["data"] : found).as<Numbers>();
+    if (const YAML::Node found = node[key]) return numbers_of(found);
   }
   return std::nullopt;
 }
 
+/// Two of these names of one thing that are both there, with different numbers; empty where no two are.
+std::string two_differ(const YAML::Node& node, std::initializer_list<const char*> keys) {
+  const char* first = nullptr;
+  for (const char* key : keys) {
+    const YAML::Node found = node[key];
+    if (!found) continue;
+    if (first == nullptr) {
+      first = key;
+      continue;
+    }
+    if (numbers_of(node[first]) != numbers_of(found)) return fmt::format("{} and {}", first, key);
+  }
+  return {};
+}
+
+constexpr std::initializer_list<const char*> kWidthKeys = {"image_width", "width"},
+                                             kHeightKeys = {"image_height", "height"},
+                                             kMatrixKeys = {"camera_matrix", "K", "k"},
+                                             kDistortionKeys = {"distortion_coefficients", "D", "d"};
+
 Result<CameraModel> ros_camera(const YAML::Node& node) {
   CameraModel camera;
+  for (const auto& keys : {kWidthKeys, kHeightKeys, kMatrixKeys, kDistortionKeys}) {
+    if (const std::string two = two_differ(node, keys); !two.empty()) {
+      return Error{Errc::bad_format,
+                   fmt::format("says one thing twice, differently: {}; take out the one that is not meant", two)};
+    }
+  }
   const YAML::Node width = node["image_width"] ? node["image_width"] : node["width"];
   const YAML::Node height = node["image_height"] ? node["image_height"] : node["height"];
   if (!width || !height)
     return Error{Errc::bad_format, "lacks image_width and image_height; add the size the lens was calibrated at"};
-  camera.width_px = width.as<int>();
-  camera.height_px = height.as<int>();
+  camera.width_px = whole_of(width);
+  camera.height_px = whole_of(height);
   if (!node["distortion_model"]) return lacks_distortion("distortion_model");
   const auto model = node["distortion_model"].as<std::string>();
   if (model != "plumb_bob" && model != "rational_polynomial" && !model.empty())
     return unknown_model("its distortion_model", model);
   for (const char* binning : {"binning_x", "binning_y"}) {
-    if (node[binning] && node[binning].as<int>() > 1)
+    if (node[binning] && whole_of(node[binning]) > 1)
       return Error{Errc::unsupported,
                    fmt::format("its {} is over 1: give the lens of the pictures as they are, all lengths of them in "
                                "px divided by it",
@@ -155,7 +213,7 @@ Result<CameraModel> ros_camera(const YAML::Node& node) {
   }
   // Width and K are the whole sensor's; of the pictures they hold only where the region of interest is all of it.
   if (const YAML::Node roi = node["roi"]) {
-    const auto of_roi = [&roi](const char* key) { return roi[key] ? roi[key].as<int>() : 0; };
+    const auto of_roi = [&roi](const char* key) { return roi[key] ? whole_of(roi[key]) : 0; };
     const int x = of_roi("x_offset"), y = of_roi("y_offset"), wide = of_roi("width"), high = of_roi("height");
     if (x != 0 || y != 0 || (wide != 0 && wide != camera.width_px) || (high != 0 && high != camera.height_px)) {
       return Error{
@@ -165,9 +223,9 @@ Result<CameraModel> ros_camera(const YAML::Node& node) {
                       wide, high, x, y, x, y)};
     }
   }
-  const auto matrix = numbers_under(node, {"camera_matrix", "K", "k"});
+  const auto matrix = numbers_under(node, kMatrixKeys);
   if (const auto sound = set_matrix(matrix.value_or(Numbers()), camera); !sound) return sound.error();
-  const auto distortion = numbers_under(node, {"distortion_coefficients", "D", "d"});
+  const auto distortion = numbers_under(node, kDistortionKeys);
   if (!distortion) return lacks_distortion("distortion_coefficients");
   if (const auto sound = set_distortion(*distortion, camera); !sound) return sound.error();
   return camera;
@@ -180,12 +238,12 @@ Result<CameraModel> kalibr_camera(const YAML::Node& node) {
   const auto distortion = node["distortion_model"].as<std::string>();
   if (distortion != "radtan" && distortion != "none") return unknown_model("its distortion_model", distortion);
   if (distortion == "radtan" && !node["distortion_coeffs"]) return lacks_distortion("distortion_coeffs");
-  const auto size = node["resolution"].as<std::vector<int>>();
+  const auto size = node["resolution"].as<std::vector<YAML::Node>>();
   const Numbers f = node["intrinsics"].as<Numbers>();
   const Numbers d = distortion == "none" ? Numbers{} : node["distortion_coeffs"].as<Numbers>();
   if (size.size() != 2 || f.size() != 4 || (distortion == "radtan" && d.size() != 4))
     return Error{Errc::bad_format, "has not 2 numbers of resolution, 4 of intrinsics and 4 of distortion_coeffs"};
-  CameraModel camera{size[0], size[1], f[0], f[1], f[2], f[3]};
+  CameraModel camera{whole_of(size[0]), whole_of(size[1]), f[0], f[1], f[2], f[3]};
   if (const auto sound = set_distortion(d, camera); !sound) return sound.error();
   return camera;
 }
@@ -235,7 +293,12 @@ std::string twice_in(const YAML::Node& map, int deeper = 1) {
 template <typename Parse>
 auto of_yaml(const std::string& text, const Parse& parse) -> decltype(parse(YAML::Node())) {
   try {
-    const YAML::Node root = YAML::Load(text);
+    std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    // ROS prints "---" behind each message, behind which there may be none.
+    std::erase_if(documents, [](const YAML::Node& document) { return document.IsNull(); });
+    if (documents.size() > 1)
+      return Error{Errc::bad_format, "holds several documents (---); keep the one that is meant"};
+    const YAML::Node root = documents.empty() ? YAML::Node() : documents.front();
     if (const std::string twice = twice_in(root); !twice.empty()) return stands_twice(twice);
     return parse(root);
   } catch (const YAML::Exception& error) {

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "calibration/base/lower_case.hpp"
+#include "calibration/geometry/rigid_matrix.hpp"
 #include "host/files/column_names.hpp"
 #include "host/files/point_sets.hpp"
 #include "host/files/pose_collector.hpp"
@@ -314,6 +315,13 @@ Result<NamedPoints> read_named_points(const fs::path& path, PointsOf of) {
     return Error{Errc::bad_format, fmt::format("{}: its points are the patient's (LPS or RAS) where one of a sensor's "
                                                "frame is asked for; give a text with a line x y z, mm",
                                                path.string())};
+  }
+  for (const StatedPoint& point : stated->points) {
+    if (const double most_mm = point.place_mm.cwiseAbs().maxCoeff(); !(most_mm <= kFarthestMm)) {
+      return Error{Errc::bad_value, fmt::format("{}: a point is {:.6g} mm away, further than {:.0f} m: give the points "
+                                                "in mm",
+                                                path.string(), most_mm, kFarthestMm / 1000)};
+    }
   }
   if (extension != ".mps") turn(*stated, of, path);
   NamedPoints out;

@@ -30,12 +30,20 @@ std::optional<std::pair<std::string_view, std::string_view>> field_of(std::strin
   return std::pair{bare(line.substr(0, line[equals - 1] == ':' ? equals - 1 : equals)), bare(line.substr(equals + 1))};
 }
 
-void take_line(std::string_view line, SequenceHeader& header) {
+/// twice: the name of a field that stands twice with different values, of which one reader takes the first, another the
+/// last.
+void put(SequenceHeader::Fields& fields, std::string_view key, std::string_view name, std::string_view value,
+         std::string& twice) {
+  const auto [field, is_new] = fields.emplace(key, value);
+  if (!is_new && field->second != value) twice = name;
+}
+
+void take_line(std::string_view line, SequenceHeader& header, std::string& twice) {
   const auto field = field_of(line);
   if (!field) return;
   std::string_view key = field->first;
   if (!key.starts_with(kFrame)) {
-    header.fields.insert_or_assign(std::string(key), std::string(field->second));
+    if (!key.starts_with('#')) put(header.fields, key, key, field->second, twice);
     return;
   }
   key.remove_prefix(kFrame.size());
@@ -44,7 +52,7 @@ void take_line(std::string_view line, SequenceHeader& header) {
   if (error != std::errc() || end == key.data() + key.size() || *end != '_') return;
   key.remove_prefix(static_cast<std::size_t>(end - key.data()) + 1);
   if (key.ends_with(kTransformField)) header.transforms.emplace(key.substr(0, key.size() - kTransformField.size()));
-  header.frames[number].insert_or_assign(std::string(key), std::string(field->second));
+  put(header.frames[number], key, field->first, field->second, twice);
 }
 
 }  // namespace
@@ -56,10 +64,10 @@ Result<SequenceHeader> read_sequence_header(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
   SequenceHeader header;
-  std::string line;
+  std::string line, twice;
   for (bool nrrd = false, first = true; next_line(in, line, kLongestLine); first = false) {
     if (first) nrrd = line.starts_with("NRRD");
-    take_line(line, header);
+    take_line(line, header, twice);
     // Here the header ends and the pixels begin.
     if (line.starts_with("ElementDataFile") || (nrrd && (line.empty() || line == "\r"))) {
       header.whole = true;
@@ -69,12 +77,21 @@ Result<SequenceHeader> read_sequence_header(const fs::path& path) {
     }
   }
   if (in.bad()) return Error{Errc::unreadable, fmt::format("{}: {}", path.string(), kNotReadToItsEnd)};
+  if (!twice.empty() && (header.whole || !header.frames.empty())) {
+    return Error{Errc::bad_format, fmt::format("{}: has {} twice, with different values; keep the line that is right",
+                                               path.string(), twice.substr(0, 80))};
+  }
   return header;
 }
 
 std::string_view value_of(const SequenceHeader::Fields& fields, std::string_view key) {
   const auto found = fields.find(key);
   return found == fields.end() ? std::string_view() : std::string_view(found->second);
+}
+
+bool says_true(const SequenceHeader::Fields& fields, std::string_view key) {
+  const std::string_view value = value_of(fields, key);
+  return !value.empty() && (value[0] == 'T' || value[0] == 't' || value[0] == '1');
 }
 
 }  // namespace birdseye::host

@@ -31,10 +31,13 @@ struct SequenceHeader {
   std::uint64_t data_offset = 0;         ///< where in the file the header ends
 };
 
-/// Reads the header. Refuses, naming the file, what is not there, cannot be opened or cannot be read to its end. A file
-/// without such fields gives an empty header.
+/// Reads the header. Refuses, naming the file, what is not there, cannot be opened or cannot be read to its end, and a
+/// field that stands twice with different values. A file without such fields gives an empty header.
 Result<SequenceHeader> read_sequence_header(const std::filesystem::path& path);
 
 std::string_view value_of(const SequenceHeader::Fields& fields, std::string_view key);
+
+/// As MetaIO takes it: "True", "T", "1" and what begins as these is true, all else is not.
+bool says_true(const SequenceHeader::Fields& fields, std::string_view key);
 
 }  // namespace birdseye::host

@@ -147,7 +147,11 @@ Result<void> SequenceReader::find_pixels() {
   pixels_->in.open(file, std::ios::binary);
   if (named.empty() || fs::path(named).has_parent_path() || !pixels_->in || !fs::is_regular_file(file, ignored))
     return refused(Errc::not_found, path_, fmt::format("the file of its pixels, \"{}\", is not beside it", named));
-  pixels_->compressed = value_of(header_.fields, "CompressedData") == "True";
+  if (!value_of(header_.fields, "BinaryData").empty() && !says_true(header_.fields, "BinaryData")) {
+    return refused(Errc::unsupported, path_,
+                   "its pixels are text (BinaryData), which is not read; save it again with BinaryData = True");
+  }
+  pixels_->compressed = says_true(header_.fields, "CompressedData");
   if (pixels_->compressed && ::inflateInit(&pixels_->zip) != Z_OK)
     return refused(Errc::io, path_, "cannot be decompressed; is there memory left?");
   const auto frame_bytes = static_cast<std::uint64_t>(channels_) * static_cast<std::uint64_t>(width_px_) *

@@ -25,6 +25,7 @@ std::array<Colour, kSteps> viridis() {
 }  // namespace
 
 Colour even_colour(double share) {
+  if (!std::isfinite(share)) return {128, 128, 128};
   static const std::array<Colour, kSteps> kColours = viridis();
   return kColours[static_cast<std::size_t>(std::lround((kSteps - 1) * std::clamp(share, 0.0, 1.0)))];
 }

@@ -43,6 +43,15 @@ bool are_place(const std::vector<double>& numbers) {
          std::all_of(numbers.begin(), numbers.end(), [](double mm) { return std::isfinite(mm); });
 }
 
+/// How many of a NRRD's axes have a direction: of "none (0,1,0) (0,0,2)" two, and one that is not finite is none.
+int directions_in(const std::string& text) {
+  int count = 0;
+  for (auto from = text.find('('); from != std::string::npos; from = text.find('(', from + 1)) {
+    if (are_place(numbers_in(text.substr(from, text.find(')', from) - from)))) ++count;
+  }
+  return count;
+}
+
 /// The first of these fields that is said a second time with another value; empty where none is.
 std::string said_again(const HeaderFields& fields, std::initializer_list<const char*> names) {
   for (const char* name : names) {
@@ -96,6 +105,11 @@ GeometryGaps gaps_of_nrrd(const HeaderFields& fields) {
           "axes)";
     }
     gaps.orientation = "does not say which way its axes point (it has no \"space directions\")";
+  } else if (directions_in(directions) < 3) {
+    // Its reader takes an axis without a direction for one of 1 mm.
+    const std::string which = fmt::format("(its \"space directions\" are {})", directions.substr(0, 80));
+    gaps.spacing = fmt::format("does not say how far apart its voxels are along each axis {}", which);
+    gaps.orientation = fmt::format("does not say which way each of its axes points {}", which);
   }
   if (space.empty()) {
     gaps.orientation = "does not say which way its axes point (it has no \"space\", as left-posterior-superior)";
@@ -138,9 +152,16 @@ GeometryGaps gaps_of_meta_image(const HeaderFields& fields) {
     return std::string();
   };
   GeometryGaps gaps;
-  gaps.beyond = said_again(fields, {"NDims", "DimSize", "ElementSpacing", "ElementSize", "Offset", "Position", "Origin",
-                                    "TransformMatrix", "Rotation", "Orientation", "AnatomicalOrientation"});
+  gaps.beyond =
+      said_again(fields, {"NDims", "DimSize", "ElementSpacing", "ElementSize", "Offset", "Position", "Origin",
+                          "TransformMatrix", "Rotation", "Orientation", "AnatomicalOrientation", "DistanceUnits",
+                          "ElementToIntensityFunctionSlope", "ElementToIntensityFunctionOffset", "HeaderSize"});
   if (!gaps.beyond.empty()) return gaps;
+  // The reader passes units over.
+  if (const std::string unit = value({"distanceunits"}); !unit.empty() && unit != "?" && lower_case(unit) != "mm") {
+    gaps.beyond = fmt::format("has lengths in {} (DistanceUnits); export it in mm", unit.substr(0, 80));
+    return gaps;
+  }
   const std::string dimensions = value({"ndims"});
   if (dimensions.size() != 1 || dimensions < "1" || dimensions > "9") {
     gaps.beyond = "does not say how many dimensions it has (NDims); export it again";

@@ -11,6 +11,7 @@
 #include <sstream>
 #include <string_view>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "calibration/base/lower_case.hpp"
@@ -110,6 +111,15 @@ std::string odd_number(const HeaderFields& fields) {
   return {};
 }
 
+/// Whether a field is said, and with another number than this one.
+bool is_other_than(const HeaderFields& fields, const char* name, double number) {
+  const std::string said = field_of(fields, name);
+  double value = 0;
+  const char* const end = said.data() + said.size();
+  const auto [rest, error] = std::from_chars(said.data() + (said.starts_with('+') ? 1 : 0), end, value);
+  return !said.empty() && (error != std::errc() || rest != end || value != number);
+}
+
 std::string unread_nrrd(const fs::path& path, const HeaderFields& fields) {
   static constexpr std::array<std::string_view, 7> kEncodings = {"raw", "ascii", "txt", "text", "hex", "gzip", "gz"};
   static constexpr std::array<std::string_view, 4> kOneByte = {"uchar", "unsigned char", "uint8", "uint8_t"};
@@ -129,6 +139,12 @@ std::string unread_nrrd(const fs::path& path, const HeaderFields& fields) {
   }
   if (type == "block" || type.find("long double") != std::string::npos)
     return fmt::format("has voxels of the type \"{}\", which is not read; save it as 16-bit integers", shown(type));
+  for (const char* name : {"old min", "oldmin", "old max", "oldmax"}) {
+    const std::string value = field_of(fields, name);
+    if (type == "float" || type == "double" || value.empty() || lower_case(value) == "nan") continue;
+    return fmt::format("has voxels that stand for other values (\"{}\" {}), which are not read; save it with these",
+                       name, shown(value));
+  }
   if (!field_of(fields, "spacings").empty() && !field_of(fields, "space directions").empty())
     return "has both \"spacings\" and \"space directions\", of which NRRD allows one; take the line of the spacings "
            "away";
@@ -163,8 +179,22 @@ std::string unread_meta_image(const fs::path& path, const HeaderFields& fields, 
   const std::string type = field_of(fields, "elementtype");
   if (!is_one_of(type.substr(0, type.find("_ARRAY")), kTypes))
     return fmt::format("has voxels of the type {}, which is not read; save it as MET_SHORT", shown(type));
+  for (const auto& [name, plain] :
+       {std::pair{"ElementToIntensityFunctionSlope", 1.0}, {"ElementToIntensityFunctionOffset", 0.0}}) {
+    const std::string key = lower_case(name);
+    if (!is_other_than(fields, key.c_str(), plain)) continue;
+    return fmt::format("has voxels that stand for other values ({} {}), which are not read; save it with these", name,
+                       shown(field_of(fields, key.c_str())));
+  }
   const std::string data = field_of(fields, "elementdatafile");
   if (lower_case(data) == "local") {
+    // With -1 the voxels are the end of the file.
+    if (is_other_than(fields, "headersize", 0) && is_other_than(fields, "headersize", -1)) {
+      return fmt::format(
+          "says that its voxels begin at byte {} (HeaderSize), where its header is; take that line away, or export it "
+          "again",
+          shown(field_of(fields, "headersize")));
+    }
     if (!says_true(fields, "compresseddata")) return {};
     const std::string said = field_of(fields, "compresseddatasize");
     if (said.empty() || said == "0")

@@ -101,6 +101,9 @@ SurfacePoint SurfaceIndex::nearest(const Eigen::Vector3d& point_mm) const {
 
 std::optional<double> SurfaceIndex::first_hit_mm(const Eigen::Vector3d& origin_mm,
                                                  const Eigen::Vector3d& direction) const {
+  // Embree ends the program over a ray that is longer, or not finite.
+  constexpr double kMost_mm = 1e18;
+  if (!(origin_mm.cwiseAbs().sum() + direction.cwiseAbs().sum() < kMost_mm)) return std::nullopt;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRayHit ray{};

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/geometry/rigid_matrix.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -40,6 +42,10 @@ double share_at(const SurfaceIndex& index, const SlabSettings& settings, const E
 Result<Volume> slab_behind(const Surface& surface, const SlabSettings& settings) {
   if (!(settings.spacing_mm > 0) || !(settings.depth_mm > 0) || !settings.seen_from_mm.allFinite())
     return Error{Errc::bad_value, "spacing and depth are lengths over 0 mm, and the eye is a point"};
+  if (const double most_mm = settings.seen_from_mm.cwiseAbs().maxCoeff(); most_mm > kFarthestMm) {
+    return Error{Errc::bad_value, fmt::format("the eye point is {:.6g} mm away, further than {:.0f} m: give it in mm",
+                                              most_mm, kFarthestMm / 1000)};
+  }
   const SurfaceIndex index(surface);
   Box box, surface_box;
   for (const Eigen::Vector3f& vertex : surface.vertices_mm) {

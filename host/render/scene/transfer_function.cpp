@@ -9,7 +9,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "drivers/system/json_file.hpp"
+#include "calibration/record/strict_json.hpp"
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye::host {
 
@@ -98,15 +99,18 @@ std::vector<std::string> transfer_presets() {
 Result<TransferFunction> load_transfer_function(const std::string& name_or_path) {
   if (const auto found = presets().find(name_or_path); found != presets().end()) return TransferFunction(found->second);
   constexpr std::size_t kMostBytes = 1U << 20U;
-  const auto json = read_json_file(name_or_path, kMostBytes);
-  if (!json && json.error().code == Errc::not_found) {
+  const auto text = read_whole_file(name_or_path, kMostBytes);
+  if (!text && text.error().code == Errc::not_found) {
     return Error{Errc::not_found, fmt::format("transfer function \"{}\": neither a file nor one of {}", name_or_path,
                                               fmt::join(transfer_presets(), ", "))};
   }
-  if (!json) return json.error();
+  if (!text) return text.error();
   const auto wrong = [&](const std::string& why) {
     return Error{Errc::bad_format, fmt::format("{}: {}; see docs/manual/volumes.md", name_or_path, why)};
   };
+  std::string twice;
+  const auto json = calibration::strict_json<nlohmann::json>(*text, &twice);
+  if (!twice.empty()) return wrong(fmt::format("\"{}\" stands twice in it", twice));
   try {
     Points points;
     constexpr auto kUnknown = [](const nlohmann::json& object, std::initializer_list<const char*> known) {
@@ -115,8 +119,9 @@ Result<TransferFunction> load_transfer_function(const std::string& name_or_path)
       }
       return std::string();
     };
-    if (const std::string key = kUnknown(*json, {"points"}); !key.empty()) return wrong(key + ": unknown key");
-    for (const auto& item : json->at("points")) {
+    if (const std::string key = kUnknown(json, {"points"}); !key.empty()) return wrong(key + ": unknown key");
+    if (!json.at("points").is_array()) return wrong("points is no array");
+    for (const auto& item : json.at("points")) {
       if (const std::string key = kUnknown(item, {"hu", "rgb", "extinction_per_mm"}); !key.empty())
         return wrong(key + ": unknown key");
       const auto rgb = item.at("rgb").get<std::vector<double>>();

@@ -1,6 +1,13 @@
 #include "drivers/system/program.hpp"
 
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <exception>
 
 namespace birdseye {
 namespace {
@@ -28,6 +35,40 @@ TEST(InOneLine, OfALongTextTheMiddleIsLeftOut) {
   std::string accents;
   for (int i = 0; i < 3000; ++i) accents += "\xC3\xB6";
   EXPECT_EQ(in_one_line("x" + accents).find('?'), std::string::npos) << "no character is cut in two";
+}
+
+/// CLI11's App, as far as run_program() knows it.
+struct AnyApp {
+  static std::string get_name() { return "any"; }
+  template <typename Message>
+  static void failure_message(const Message& /*message*/) {}
+  static void parse(int /*argc*/, char** /*argv*/) {}
+  static int exit(const std::exception& /*error*/) { return 1; }
+};
+struct NeverThrown : std::exception {};
+
+TEST(RunProgram, AFileBeyondTheLimitOnSizesIsAnErrorAndNoEnd) {
+  const auto handler = ::signal(SIGXFSZ, SIG_DFL);
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  std::string name = "/tmp/birdseye-test-XXXXXX";
+  const int file = ::mkstemp(name.data());
+  ASSERT_GE(file, 0);
+  ::unlink(name.c_str());
+  AnyApp app;
+  const int code = run_program<NeverThrown>(app, 0, nullptr, [&] {
+    const rlimit none{0, before.rlim_max};
+    EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &none), 0);
+    const auto written = ::write(file, "a", 1);
+    const int why = errno;
+    ::setrlimit(RLIMIT_FSIZE, &before);
+    EXPECT_EQ(written, -1);
+    EXPECT_EQ(why, EFBIG);
+    return 7;
+  });
+  EXPECT_EQ(code, 7);
+  ::close(file);
+  ::signal(SIGXFSZ, handler);
 }
 
 }  // namespace

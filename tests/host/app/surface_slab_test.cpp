@@ -72,6 +72,19 @@ TEST(SurfaceSlab, RefusesWhatMakesNoSlab) {
   settings = {};
   settings.seen_from_mm = {200, 0, 50};  // in its plane
   EXPECT_FALSE(slab_behind(square(), settings));
+  for (const double far_mm : {1e5 + 1, 1e20, 1e300}) {
+    settings.seen_from_mm = {0, 0, far_mm};
+    const auto v = slab_behind(square(), settings);
+    ASSERT_FALSE(v) << far_mm;
+    EXPECT_NE(v.error().what.find("the eye point is"), std::string::npos) << v.error().what;
+  }
+  // Embree itself would end the program.
+  const SurfaceIndex index(square());
+  EXPECT_TRUE(index.first_hit_mm({0, 0, 0}, {0, 0, 1}));
+  for (const double far_mm : {1e20, 1e300, std::nan("")}) {
+    EXPECT_FALSE(index.first_hit_mm({0, 0, far_mm}, {0, 0, -1})) << far_mm;
+    EXPECT_FALSE(index.first_hit_mm({0, 0, 0}, {0, 0, far_mm})) << far_mm;
+  }
 }
 
 TEST(VolumeFromSurface, WritesAVolumeAndRefusesInOneLine) {

@@ -177,6 +177,40 @@ TEST(CameraFiles, AKeyThatStandsTwiceIsRefused) {
   }
 }
 
+TEST(CameraFiles, OneThingUnderTwoNamesIsRefusedUnlessTheyAgree) {
+  const std::string k = "K: [458.654, 0, 367.215, 0, 457.296, 248.375, 0, 0, 1]\n";
+  const auto alike = read_lens_text(kRos + "width: 752\nheight: 480\n" + k);
+  ASSERT_TRUE(alike) << alike.error().what;
+  for (const auto& [more, keys] : {std::pair{std::string("width: 640\n"), "image_width and width;"},
+                                   {std::string("height: 640\n"), "image_height and height;"},
+                                   {changed(k, "458.654", "358.654"), "camera_matrix and K;"},
+                                   {std::string("d: [0, 0, 0, 0, 0]\n"), "distortion_coefficients and d;"}}) {
+    const auto camera = read_lens_text(kRos + more);
+    ASSERT_FALSE(camera) << more;
+    EXPECT_THAT(camera.error().what, HasSubstr("lens.yaml: says one thing twice, differently: " + std::string(keys)));
+  }
+  const auto two = read_lens_text(kMessage + changed(kMessage, "width: 752", "width: 640"));
+  ASSERT_FALSE(two);
+  EXPECT_THAT(two.error().what, HasSubstr("lens.yaml: holds several documents (---)"));
+}
+
+/// yaml-cpp and OpenCV count it by eights: 064 is 52.
+TEST(CameraFiles, AWholeNumberIsDecimal) {
+  for (const std::string& text : {changed(kRos, "752", "0752"), changed(kMessage, "752", "0752"),
+                                  changed(kChain, "[752, 480]", "[0752, 0480]")}) {
+    const auto camera = read_lens_text(text);
+    ASSERT_TRUE(camera) << camera.error().what;
+    EXPECT_EQ(camera->width_px, 752);
+    EXPECT_EQ(camera->height_px, 480);
+  }
+  const auto opencv = read_lens_text(changed(camera_text(kLens), "image_width: 1920", "image_width: 01720"));
+  ASSERT_FALSE(opencv);
+  EXPECT_THAT(opencv.error().what, HasSubstr("lens.yaml: has a picture of 01720 px; write the number without the 0"));
+  const auto letters = read_lens_text(changed(kRos, "752", "752px"));
+  ASSERT_FALSE(letters);
+  EXPECT_THAT(letters.error().what, HasSubstr("a whole decimal number belongs there"));
+}
+
 TEST(CameraFiles, AWholeNumberThatOpenCvTakesForAnotherIsRefused) {
   const std::string text = changed(camera_text(kLens), "540.75", "18446744073709551615");
   const auto camera = read_lens_text(text);

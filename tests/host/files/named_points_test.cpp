@@ -99,6 +99,8 @@ TEST(NamedPoints, WhatIsNoListOfPointsIsRefusedWithTheRemedy) {
       {"uncounted.txt", "1 1.5 2 3\n4.5 5 6\n", "line 2: the lines begin with a number that counts the points"},
       {"words.txt", "once upon a time\n", "name,x,y,z"},
       {"nan.txt", "nan 1 2\n", "line 1: \"nan\" is not finite"},
+      {"far.txt", "1 2 3\n1e300 0 0\n", "a point is 1e+300 mm away, further than 100 m: give the points in mm"},
+      {"metres.csv", "x [m],y [m],z [m]\n0,0,-101\n", "a point is 101000 mm away"},
       {"lacks.csv", "name,x,y\na,1,2\n", "x, y and z are not named there, each once"},
       {"twice.csv", "x,y,z,tx\n1,2,3,4\n", "each once"},
       {"units.csv", "x [mm],y [m],z [m]\n1,2,3\n", "are not all in mm"},

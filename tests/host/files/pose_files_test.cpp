@@ -180,6 +180,24 @@ TEST(PoseFiles, AnNrrdWithoutTimesCounts) {
   EXPECT_EQ(set->poses[0].time_s, 7);
 }
 
+TEST(PoseFiles, ASequenceThatSaysAFieldTwiceDifferentlyIsRefusedByItsName) {
+  const Scratch scratch;
+  const std::string pose = "0000_StylusToTrackerTransform = ", other = "0 -1 0 65 1 0 0 20 0 0 1 30 0 0 0 1";
+  EXPECT_TRUE(read_pose_set(scratch.file("alike.mha", sequence({pose + kPose, pose + kPose}))));
+  const auto of_frame = read_pose_set(scratch.file("frame.mha", sequence({pose + kPose, pose + other})));
+  ASSERT_FALSE(of_frame);
+  EXPECT_NE(of_frame.error().what.find("frame.mha: has Seq_Frame0000_StylusToTrackerTransform twice"),
+            std::string::npos)
+      << of_frame.error().what;
+  const auto of_all = read_pose_set(scratch.file("all.mha", "NDims = 2\n" + sequence({pose + kPose})));
+  ASSERT_FALSE(of_all);
+  EXPECT_NE(of_all.error().what.find("all.mha: has NDims twice"), std::string::npos) << of_all.error().what;
+  const std::string remarks = "NRRD0004\n# by = one\n# by = two\n";
+  const auto remarked =
+      read_pose_set(scratch.file("s.nrrd", remarks + "Seq_Frame0007_ProbeToTrackerTransform:=" + kPose + "\n\n"));
+  ASSERT_TRUE(remarked) << remarked.error().what;
+}
+
 TEST(PoseFiles, OneSensorAgainstAnother) {
   const Scratch scratch;
   const std::string path = scratch.file(

@@ -178,12 +178,19 @@ TEST(SequenceFiles, GreyCompressedAndTurnedPicturesOfPlusAreRead) {
   auto plain = SequenceReader::open(scratch.file("a.igs.mha", header("MFA", "MFA") + pixels));
   ASSERT_TRUE(plain) << plain.error().what;
   EXPECT_EQ(grey(plain->read(1)), second);
-  auto compressed = SequenceReader::open(
-      scratch.file("b.igs.mha", header("CompressedData = False", "CompressedData = True") + zipped));
-  ASSERT_TRUE(compressed) << compressed.error().what;
-  EXPECT_EQ(compressed->frames(), 2U);
-  EXPECT_EQ(grey(compressed->read(1)), second);
-  EXPECT_EQ(grey(compressed->read(0)).front(), 1);  // back again
+  for (const std::string word : {"True", "true", "T", "1"}) {
+    auto compressed = SequenceReader::open(
+        scratch.file("b.igs.mha", header("CompressedData = False", "CompressedData = " + word) + zipped));
+    ASSERT_TRUE(compressed) << compressed.error().what;
+    EXPECT_EQ(compressed->frames(), 2U);
+    EXPECT_EQ(grey(compressed->read(1)), second) << word;
+    EXPECT_EQ(grey(compressed->read(0)).front(), 1);  // back again
+  }
+  EXPECT_TRUE(SequenceReader::open(scratch.file("e.igs.mha", header("NDims", "BinaryData = True\nNDims") + pixels)));
+  const auto text =
+      SequenceReader::open(scratch.file("f.igs.mha", header("NDims", "BinaryData = False\nNDims") + pixels));
+  ASSERT_FALSE(text);
+  EXPECT_NE(text.error().what.find("its pixels are text (BinaryData)"), std::string::npos) << text.error().what;
   auto turned = SequenceReader::open(scratch.file("c.igs.mha", header("MFA", "UN") + pixels));
   ASSERT_TRUE(turned) << turned.error().what;
   EXPECT_EQ(grey(turned->read(0)), (std::vector<int>{8, 7, 6, 5, 4, 3, 2, 1}));

@@ -2,13 +2,17 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "host/render/cpu/ray_caster.hpp"
 #include "host/render/reference/reference_renderer.hpp"
 #include "tests/support/render_scene.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -253,6 +257,21 @@ TEST(TransferFunction, ReadsPresetsAndNamesWhatItDoesNotKnow) {
   EXPECT_NEAR(static_cast<double>(soft().at(100).extinction_per_mm), 0.125, 1e-6);
   EXPECT_FALSE(soft().any_seen(-1024, -400));
   EXPECT_TRUE(soft().any_seen(-1024, -399));
+}
+
+TEST(TransferFunction, AFileThatSaysAKeyTwiceOrHasNoArrayIsRefused) {
+  const testing::Scratch scratch;
+  const std::string point = R"({"hu": 10, "rgb": [1, 1, 1], "extinction_per_mm": 0.1)";
+  EXPECT_TRUE(load_transfer_function(scratch.file("good.json", R"({"points": [)" + point + "}]}")));
+  for (const auto& [name, text, why] : std::vector<std::array<std::string, 3>>{
+           {"twice.json", R"({"points": [)" + point + R"(, "extinction_per_mm": 2}]})",
+            "\"extinction_per_mm\" stands twice in it"},
+           {"object.json", R"({"points": {"a": )" + point + "}}}", "points is no array"},
+           {"cut.json", R"({"points": [)", "is not a transfer function in JSON"}}) {
+    const auto read = load_transfer_function(scratch.file(name, text));
+    ASSERT_FALSE(read) << name;
+    EXPECT_NE(read.error().what.find(name + ": " + why), std::string::npos) << read.error().what;
+  }
 }
 
 TEST(OnGrey, IsTheGreyWhereNothingIsDrawnAndBlendsWhereSomethingIs) {

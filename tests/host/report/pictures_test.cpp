@@ -58,6 +58,8 @@ TEST(ReportPictures, EvenColoursGrowBrighterAllTheWay) {
   }
   EXPECT_EQ(even_colour(-3), even_colour(0));
   EXPECT_EQ(even_colour(7), even_colour(1));
+  for (const double none : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
+    EXPECT_EQ(even_colour(none), (Colour{128, 128, 128}));
 }
 
 std::vector<std::string> all_of(const std::string& text, const std::string& pattern) {

@@ -41,6 +41,15 @@ TEST(StatedGeometry, ATextHeaderSaysWhereTheVoxelsLieOrWhatItLacks) {
            {"k.nrrd", kNrrd + "space: LPS\nspacings: 1 1 nan\n\n", "spacings", "space directions", ""},
            {"l.nrrd", kNrrd + "space: LPS\nspace units: \"m\" \"m\" \"m\"\n" + directions + "\n", "", "", "in mm"},
            {"m.nrrd", kNrrd + "space: LPS\nspace units: \"mm\" \"mm\" \"mm\"\n" + directions + "\n", "", "", ""},
+           {"s.nrrd", kNrrd + "space: LPS\nspace directions: none (0,2,0) (0,0,2)\n\n", "along each axis (its",
+            "which way each of its axes", ""},
+           {"t.nrrd", kNrrd + "space: LPS\nspace directions: none none none\n\n", "are none none none", "each of", ""},
+           {"u.nrrd", kNrrd + "space: LPS\nspace directions: (1,0,0) (nan,nan,nan) (0,0,2)\n\n", "along each axis",
+            "each of", ""},
+           {"v.nrrd", kNrrd + "space: LPS\nspace directions: none (1,0,0) (0,1,0) (0,0,2)\n\n", "", "", ""},
+           {"s.mha", kMeta + turn + "ElementSpacing = 1 1 2\nDistanceUnits = cm\n" + local, "", "", "in cm (Dist"},
+           {"t.mha", kMeta + turn + "ElementSpacing = 1 1 2\nDistanceUnits = mm\n" + local, "", "", ""},
+           {"u.mha", kMeta + turn + "ElementSpacing = 1 1 2\nDistanceUnits = ?\n" + local, "", "", ""},
            {"g.mha", kMeta + turn + "ElementSpacing = 1 1 2\n" + local, "", "", ""},
            {"h.mha", kMeta + turn + local + "ElementSpacing = 1 1 2\n", "ElementSpacing", "", ""},
            {"n.mha", kMeta + turn + "ElementSpacing = 1 1 0\n" + local, "ElementSpacing", "", ""},
@@ -245,6 +254,14 @@ TEST(StatedGeometry, WhatAFileDoesNotSayAPersonMayStateAndNothingElse) {
   expect_refused(import_volume(stated(whole, std::nullopt, "LPS")), "whole.mha", "itself: leave --orientation");
   expect_refused(import_volume(stated(nospace, thick, "LPS")), "nospace.nrrd", "itself: leave --spacing");
   expect_refused(import_volume(stated(nospacing, std::nullopt, "LPS")), "nospc.mha", "ElementSpacing");
+  // One axis of three has no direction: a person has to say both.
+  const fs::path partly =
+      scratch.file("partly.nrrd", nrrd + "space: LPS\nspace directions: none (0,1,0) (0,0,2)\n\n" + voxels(size));
+  expect_refused(import_volume(partly), "partly.nrrd", "--spacing");
+  expect_refused(import_volume(stated(partly, thick, "")), "partly.nrrd", "--orientation");
+  read = import_with_notes(stated(partly, thick, "LPS"));
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->volume.spacing_mm, thick);
 }
 
 TEST(StatedGeometry, AFileThatDoesNotSayWhereItsFirstVoxelLiesIsReadWithANote) {
