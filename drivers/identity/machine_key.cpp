@@ -52,6 +52,11 @@ Result<void> own_folder(const fs::path& folder) {
   }
   struct stat status {};
   if (::stat(folder.c_str(), &status) != 0) return cannot(folder, "cannot be read");
+  if (!S_ISDIR(status.st_mode)) {
+    return Error{Errc::bad_value, fmt::format("{}: is no folder, and this machine's key lies in one; set "
+                                              "BIRDSEYE_IDENTITY to a folder",
+                                              folder.string())};
+  }
   if (auto checked = check_owner(folder, status); !checked) return checked;
   if ((status.st_mode & (S_IWGRP | S_IWOTH)) == 0) return {};
   return Error{Errc::bad_value, fmt::format("{}: others than its owner may change the keys in it: chmod 700 {}",

@@ -130,7 +130,7 @@ Result<ExitCode> bench_register(const BenchRegisterOptions& options) {
 }
 
 /// One line of JSON: every trial of the seed, or that the simulator refuses it. No times, which are others each time.
-Result<void> print_line(BenchRegisterOptions options) {
+Result<void> print_seed(BenchRegisterOptions options) {
   options.simulated.seed = *options.seed;
   nlohmann::json trials = nlohmann::json::array();
   auto all =
@@ -157,7 +157,7 @@ Result<void> print_line(BenchRegisterOptions options) {
   return {};
 }
 
-/// The table of lines that print_line() printed.
+/// The table of lines that print_seed() printed.
 Result<ExitCode> table_of_lines(const BenchRegisterOptions& options) {
   const auto whole = read_whole_file(options.lines, kMostTextBytes);
   if (!whole) return whole.error();
@@ -283,7 +283,7 @@ void add_bench_register(CLI::App& bench, CommandStatus& status) {
   command.callback([options, &status] {
     if (!options->factors.folder.empty()) return status.take(factors(*options));
     if (!options->study.empty()) return status.take(study(*options));
-    if (options->seed) return status.take(print_line(*options));
+    if (options->seed) return status.take(print_seed(*options));
     const auto done = options->lines.empty() ? bench_register(*options) : table_of_lines(*options);
     done ? void(status.code = *done) : status.refuse(done.error());
   });

@@ -224,8 +224,10 @@ void add_calibrate_camera(CLI::App& calibrate, CommandStatus& status) {
                    "a pixel's width over its height: 0.5 (or 1:2) of field-squeezed video, as 1920x540")
       ->type_name("RATIO");
   command->add_flag("--plain", options->plain, "plain least squares: nothing that does not fit is left out");
-  command->add_option("--rod-angle-deg", options->rod_angle_deg,
-                      "of an oblique scope: at what the rod stood against the camera head (kept with the result)");
+  command
+      ->add_option("--rod-angle-deg", options->rod_angle_deg,
+                   "of an oblique scope: at what the rod stood against the camera head (kept with the result)")
+      ->check(CLI::Range(-360.0, 360.0));
   command->add_option("--right-out", options->right_out, "the right camera, as --out")->type_name("FILE");
   command->add_option("--right-from-left-out", options->right_from_left_out, "4x4 matrix, left to right camera, mm")
       ->type_name("FILE");

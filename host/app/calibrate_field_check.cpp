@@ -5,10 +5,14 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "drivers/system/clock.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/results.hpp"
 #include "host/calibrate/field_pictures.hpp"
 #include "host/files/field_files.hpp"
@@ -39,12 +43,27 @@ Result<AdmittedField> field_of(const CalibrateFieldCheckOptions& options) {
   return AdmittedField{std::move(read->map), "of an author who cannot be told: " + authors.error().what};
 }
 
+using Places = std::vector<std::pair<std::string, Eigen::Vector3d>>;
+
+/// Of two places of one name nobody can tell which is meant.
+Result<void> check_names(const Places& places, const std::filesystem::path& path) {
+  std::set<std::string> names;
+  for (const auto& [name, place] : places) {
+    if (!names.insert(name).second)
+      return Error{Errc::bad_value, fmt::format("{}: has \"{}\" twice; give each place once, by a name of its own",
+                                                path.string(), name)};
+  }
+  return {};
+}
+
 Result<std::vector<CheckedPlace>> places_of(const CalibrateFieldCheckOptions& options,
                                             const std::optional<calibration::FieldMap>& map) {
   const auto plate = read_places(options.plate);
   if (!plate) return plate.error();
   auto measured = read_places(options.measured);
   if (!measured) return measured.error();
+  if (const auto sound = check_names(*plate, options.plate); !sound) return sound.error();
+  if (const auto sound = check_names(*measured, options.measured); !sound) return sound.error();
   std::vector<CheckedPlace> out;
   for (const auto& [name, place] : *measured) {
     const auto known =
@@ -120,17 +139,15 @@ void run(const CalibrateFieldCheckOptions& options, CommandStatus& status) {
   // Places that are touched again are no other day.
   const auto is_today = [&when](const FieldCheck& day) { return day.when.starts_with(when.substr(0, kDateLength)); };
   if (options.when.empty() && std::erase_if(*history, is_today) > 0)
-    fmt::print("in {} this check replaces today's former\n", options.history.string());
+    print_line(fmt::format("in {} this check replaces today's former", options.history.string()));
   const auto check = calibration::check_field(when, *places);
   if (!check) return status.refuse(check.error().with_context(options.measured.string()));
   history->push_back(*check);
-  // A bad day belongs into the history like any other; the file is replaced as a whole.
-  if (const auto written = write_file(options.history, history_text(*history)); !written)
-    return status.refuse(written.error());
   Verdict verdict = calibration::verdict_of(*history);
   tell_doubts({}, *field, verdict);
+  // A bad day belongs into the history like any other.
   finish_calibration(options.results, "", json_of(*check, *places, *history), page_of(*check, *places, *history),
-                     verdict, status);
+                     verdict, status, {}, {options.history, history_text(*history)});
 }
 
 }  // namespace

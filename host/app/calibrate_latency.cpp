@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "calibration/latency/latency.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/calibrate_commands.hpp"
 #include "host/app/pose_options.hpp"
 #include "host/app/results.hpp"
@@ -199,9 +200,9 @@ void run(const CLI::App& command, const CalibrateLatencyOptions& options, Comman
   const std::string doubt = tell_doubts(*recording, *field, verdict);
   if (verdict.grade != Grade::fail) {
     const Latency& l = found->latency;
-    fmt::print("offset {:.2f} ms (95 %: {:.2f} to {:.2f}), drift {:.1f} ppm (95 %: {:.1f} to {:.1f})\n{}\n",
-               l.offset_ms, l.offset_ci95_ms[0], l.offset_ci95_ms[1], l.drift_ppm, l.drift_ci95_ppm[0],
-               l.drift_ci95_ppm[1], found->advice);
+    fmt::print("offset {:.2f} ms (95 %: {:.2f} to {:.2f}), drift {:.1f} ppm (95 %: {:.1f} to {:.1f})\n", l.offset_ms,
+               l.offset_ci95_ms[0], l.offset_ci95_ms[1], l.drift_ppm, l.drift_ci95_ppm[0], l.drift_ci95_ppm[1]);
+    print_line(found->advice);
   }
   nlohmann::json json = latency_json(found->latency, verdict);
   json.update(found->more);

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <memory>
 
+#include "drivers/system/program.hpp"
 #include "host/app/calibrate_commands.hpp"
 #include "host/files/record_file.hpp"
 #include "host/files/write_files.hpp"
@@ -39,12 +40,13 @@ std::string words_of(const Identity& identity) {
 }
 
 void show(const char* name, const Provenance& from, const std::string& figures) {
-  fmt::print("{:9} {} ({}, {}; {})\n", name, figures, name_of(from.grade), from.made_utc, from.made_from);
+  print_line(fmt::format("{:9} {} ({}, {}; {})", name, figures, name_of(from.grade), from.made_utc, from.made_from));
 }
 
 void show(const CalibrationRecord& record) {
-  fmt::print("scope     {}\ntracker   {}\ncamera    {}\n", record.scope.empty() ? "(no name)" : record.scope,
-             words_of(record.tracker), words_of(record.camera));
+  print_line(fmt::format("scope     {}", record.scope.empty() ? "(no name)" : record.scope));
+  print_line(fmt::format("tracker   {}", words_of(record.tracker)));
+  print_line(fmt::format("camera    {}", words_of(record.camera)));
   if (const auto& lens = record.lens) {
     show("lens", lens->provenance,
          fmt::format("{}x{}, f {:.1f} {:.1f} px, {}, held-out {:.2f} px{}", lens->camera.width_px,

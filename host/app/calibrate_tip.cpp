@@ -103,7 +103,7 @@ void print(const TipFound& found, const TipInput& input) {
     if (!p.outliers.empty()) {
       std::vector<std::string> names;
       for (const std::size_t i : p.outliers) names.push_back(input.set.poses[i].name);
-      fmt::print("{} of {} poses are outliers: {}\n", names.size(), input.poses.size(), shorten(names));
+      print_line(fmt::format("{} of {} poses are outliers: {}", names.size(), input.poses.size(), shorten(names)));
     }
   }
   if (found.axis) fmt::print("axis in the sensor's frame {}\n", xyz_text(found.axis->axis_in_sensor, 4));

@@ -4,9 +4,11 @@
 #include <array>
 #include <filesystem>
 #include <system_error>
+#include <vector>
 
 #include "calibration/base/lower_case.hpp"
 #include "drivers/system/program.hpp"
+#include "host/files/write_files.hpp"
 
 namespace birdseye::host {
 
@@ -23,25 +25,90 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Whether it names what is written, maybe after it was read. --keep,--show names labels.
 bool is_output(const CLI::Option& option) {
-  constexpr std::array kOutputs{"--out", "--json", "--report", "--picture"};
-  return std::ranges::any_of(kOutputs, [&option](const char* name) { return option.check_name(name); });
+  constexpr std::array kOutputs{"--out",
+                                "--json",
+                                "--report",
+                                "--picture",
+                                "--pictures",
+                                "--movie",
+                                "--map",
+                                "--history",
+                                "--keep",
+                                "--list-texts",
+                                "--factors",
+                                "--right-out",
+                                "--right-from-left-out",
+                                "--export"};
+  return !option.check_name("--show") &&
+         std::ranges::any_of(kOutputs, [&option](const char* name) { return option.check_name(name); });
 }
 
-void check_outputs(const CLI::App& command) {
-  const auto options = command.get_options();
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
+/// Two of the command's files may not be one. A device or a pipe takes the texts of both.
+void check_against_output(const CLI::Option& out, const std::string& path, const CLI::Option& other) {
+  std::error_code ignored;
+  if (fs::is_other(path, ignored) || is_folder(path)) return;
+  for (const std::string& given : other.results()) {
+    if (!given.empty() && same_file(given, path))
+      throw CLI::ValidationError(out.get_name(),
+                                 path + " is written by " + other.get_name() + ", too; name another file");
+  }
+}
+
+void check_against_input(const CLI::Option& out, const std::string& path, const CLI::Option& in) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored)) return;
+  for (const std::string& given : in.results()) {
+    if (fs::equivalent(given, path, ignored)) {
+      throw CLI::ValidationError(
+          out.get_name(), path + " is read, by " + in.get_name() + ", and would be written over; name another file");
+    }
+  }
+}
+
+/// A file that is there and lies in a folder that is read.
+void check_against_folder(const CLI::Option& out, const std::string& path, const CLI::Option& in) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored)) return;
+  for (const std::string& given : in.results()) {
+    if (is_folder(given) && fs::equivalent(fs::absolute(path, ignored).parent_path(), given, ignored)) {
+      throw CLI::ValidationError(out.get_name(), path + " lies in the folder that is read, by " + in.get_name() +
+                                                     ", and would be written over; name another file");
+    }
+  }
+}
+
+/// Whether the command writes its results into a folder that it reads, too, as live with --out and --resume.
+bool is_written_into(const CLI::Option& in, const std::vector<CLI::Option*>& options) {
+  return std::ranges::any_of(options, [&in](const CLI::Option* option) {
+    return is_output(*option) && std::ranges::any_of(option->results(), [&in](const std::string& folder) {
+             return is_folder(folder) && std::ranges::any_of(in.results(), [&folder](const std::string& given) {
+                      std::error_code ignored;
+                      return fs::equivalent(given, folder, ignored);
+                    });
+           });
+  });
+}
+
+void check_outputs(CLI::App& command) {
+  const std::vector<CLI::Option*> options = command.get_options();
   for (const CLI::Option* const out : options) {
     if (!is_output(*out)) continue;
     for (const std::string& path : out->results()) {
-      std::error_code ignored;
-      if (!fs::is_regular_file(path, ignored)) continue;
-      for (const CLI::Option* const in : options) {
-        if (is_output(*in)) continue;
-        const bool read = std::ranges::any_of(
-            in->results(), [&](const std::string& given) { return fs::equivalent(given, path, ignored); });
-        if (read) {
-          throw CLI::ValidationError(out->get_name(), path + " is read, by " + in->get_name() +
-                                                          ", and would be written over; name another file");
+      if (path.empty()) continue;
+      for (const CLI::Option* const other : options) {
+        if (other == out) continue;
+        if (is_output(*other)) {
+          check_against_output(*out, path, *other);
+        } else {
+          check_against_input(*out, path, *other);
+          if (!is_written_into(*other, options)) check_against_folder(*out, path, *other);
         }
       }
     }

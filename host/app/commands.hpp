@@ -46,8 +46,8 @@ void add_volume_info(CLI::App& volume, CommandStatus& status);          ///< und
 void add_volume_from_surface(CLI::App& volume, CommandStatus& status);  ///< under `volume`
 void add_volume_markers(CLI::App& volume, CommandStatus& status);       ///< under `volume`
 
-/// Of the app and all its commands: a file that is given to be read is not written over by what comes out. Once all
-/// commands are added.
+/// Of the app and all its commands: a file that is given to be read, or lies in a folder that is, is not written over
+/// by what comes out, and no two files that come out are one. Once all commands are added.
 void refuse_outputs_over_inputs(CLI::App& app);
 
 }  // namespace birdseye::host

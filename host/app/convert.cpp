@@ -5,6 +5,7 @@
 
 #include "drivers/identity/this_machine.hpp"
 #include "drivers/system/durable.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/operation/operation_010.hpp"
@@ -23,9 +24,9 @@ struct ConvertOptions {
 
 /// What the new operation holds, and what of it nobody knows.
 void tell(const Operation& operation, const ConvertOptions& options) {
-  fmt::print("{}: an operation of {}: {}{}{}\n", (options.out / "operation.json").string(), operation.made_utc,
-             operation.calibrated ? "calibrated, " : "", operation.registered ? "registered, " : "",
-             operation.deformed ? "deformed" : "not deformed");
+  print_line(fmt::format("{}: an operation of {}: {}{}{}", (options.out / "operation.json").string(),
+                         operation.made_utc, operation.calibrated ? "calibrated, " : "",
+                         operation.registered ? "registered, " : "", operation.deformed ? "deformed" : "not deformed"));
   print_notes(
       {fmt::format("nobody can tell whether a file of {} was changed since: that they are as the window wrote "
                    "them, you answer for: live takes it up with --accept-unsigned",

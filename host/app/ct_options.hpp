@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <string>
 #include <vector>
 
+#include "drivers/system/program.hpp"
 #include "host/volume/volume.hpp"
 #include "host/volume/volume_source.hpp"
 
@@ -49,7 +49,7 @@ inline void add_ct_options(CLI::App& command, VolumeSource& source) {
 
 /// On standard error, where they are in no other program's way.
 inline void print_notes(const std::vector<std::string>& notes) {
-  for (const std::string& note : notes) fmt::print(stderr, "birdseye: note: {}\n", note);
+  for (const std::string& note : notes) print_error("birdseye", "note: " + note);
 }
 
 }  // namespace birdseye::host

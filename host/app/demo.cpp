@@ -5,15 +5,19 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
+#include "drivers/system/json_file.hpp"
 #include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/demo/demo_session.hpp"
 #include "host/demo/demo_verdict.hpp"
 #include "host/files/camera_files.hpp"
+#include "host/files/result_folder.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/landmark_check.hpp"
@@ -102,14 +106,23 @@ struct DemoOptions {
   std::string noise = "typical";
 };
 
-/// The chosen CT as the simulator can read it, which knows no series. With the host's own checks: what would be stacked
-/// wrongly is refused here, with the reason. notes: gets what was noted of it.
-Result<fs::path> simple_ct(const VolumeSource& source, const fs::path& out, std::vector<std::string>& notes) {
-  auto ct = import_body(source);
-  if (!ct) return ct.error();
-  print_notes(ct->notes);
-  notes = std::move(ct->notes);
-  const Volume& volume = ct->volume;
+ResultFolder folder_of(const DemoOptions& options) {
+  return {options.cart.folder, "demo", "report.json",
+          "ct\\.nii\\.gz|report\\.html|(overlay|video|rigid_and_deformed)\\.png|overlay\\.mp4|simulator\\.log|"
+          "birdseyed\\.(log|toml)|cart\\.json|(tracker_from_patient|camera_from_sensor)\\.txt|camera\\.yaml",
+          "overlay_error_px_p50"};
+}
+
+/// Adds to the report which files the demo wrote: the next one may replace these, and no others.
+Result<void> list_files(const ResultFolder& folder) {
+  auto report = read_json_file(folder.path / folder.sheet);
+  if (!report) return report.error();
+  (*report)["files"] = files_of(folder);
+  return write_file(folder.path / folder.sheet, text_of(*report));
+}
+
+/// The chosen CT as the simulator can read it, which knows no series.
+Result<fs::path> write_simple_ct(const Volume& volume, const fs::path& out) {
   ImageFile image;
   image.size = volume.size;
   image.spacing_mm = volume.spacing_mm;
@@ -127,18 +140,24 @@ Result<ExitCode> demo(const DemoOptions& options) {
   settings.views = settings.deformation_mm > 0;
   if (options.noise == "none") settings.position_noise_mm = settings.angle_noise_deg = 0;
   const fs::path& out = settings.folder;
-  std::error_code error;
-  fs::create_directories(out, error);
-  if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", out.string())};
-  std::vector<std::string> ct_notes;
+  const std::vector<fs::path> inputs{options.ct.path, settings.faults};
+  if (auto is_free = check_free(folder_of(options), inputs); !is_free) return is_free.error();
+  std::optional<ImportedVolume> ct;
   if (!options.ct.path.empty()) {
-    auto simple = simple_ct(options.ct, out, ct_notes);
+    // With the host's own checks: what would be stacked wrongly is refused here, with the reason.
+    auto imported = import_body(options.ct);
+    if (!imported) return imported.error();
+    print_notes(imported->notes);
+    ct = *std::move(imported);
+  }
+  if (auto emptied = make_empty(folder_of(options), inputs); !emptied) return emptied.error();
+  std::vector<std::string> ct_notes;
+  if (ct) {
+    auto simple = write_simple_ct(ct->volume, out);
     if (!simple) return simple.error();
     settings.ct = *std::move(simple);
-  }
-  for (const char* name : {"report.json", "report.html", "overlay.png", "video.png", "rigid_and_deformed.png",
-                           "overlay.mp4", "simulator.log", "birdseyed.log"}) {
-    fs::remove(out / name, error);
+    ct_notes = std::move(ct->notes);
+    ct.reset();  // the simulator and the appliance need the memory
   }
   note_interrupts();
   progress(settings.ct.empty() ? "making the patient" : "making the patient from " + options.ct.path.string());
@@ -186,6 +205,7 @@ Result<ExitCode> demo(const DemoOptions& options) {
   session.figures.drops.tell(session.figures.verdict);
   session.figures.wall_s = progress.seconds();
   if (auto written = write_demo_report(out, session.figures); !written) return written.error();
+  if (auto listed = list_files(folder_of(options)); !listed) return listed.error();
   progress.keep((out / "report.html").string());
   fmt::print("verdict: {}\n", name_of(session.figures.verdict.grade));
   for (const std::string& reason : session.figures.verdict.reasons) print_line(reason);

@@ -1,12 +1,13 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <vector>
 
 #include "calibration/base/verdict.hpp"
-#include "drivers/system/durable.hpp"
 #include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
@@ -16,6 +17,7 @@
 #include "host/deform/transform_file.hpp"
 #include "host/files/files_sha256.hpp"
 #include "host/files/registration_file.hpp"
+#include "host/files/result_folder.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/identity_json.hpp"
@@ -171,20 +173,21 @@ Result<double> worst_difference(const fs::path& path, const Registered& register
   return worst_mm;
 }
 
-/// Takes away what an earlier export wrote there, and says so: a file that this one does not write must not be taken
-/// for this one's.
-Result<void> remove_earlier_export(const fs::path& folder) {
-  std::string removed;
-  for (const char* name : {"ct.nrrd", "registration.h5", "rigid.tfm", "deformation.nrrd", "export.json"}) {
-    std::error_code error;
-    if (fs::remove(folder / name, error)) removed += fmt::format("{}{}", removed.empty() ? "" : ", ", name);
-    if (error) {
-      return Error{Errc::unreadable,
-                   fmt::format("{}: is of an earlier export and cannot be removed; choose another --out",
-                               (folder / name).string())};
-    }
-  }
-  if (!removed.empty()) print_notes({fmt::format("{}: replaced an earlier export ({})", folder.string(), removed)});
+ResultFolder folder_of(const ExportOptions& options) {
+  return {options.out, "export", "export.json", "ct\\.nrrd|registration\\.h5|rigid\\.tfm|deformation\\.nrrd"};
+}
+
+std::vector<fs::path> inputs_of(const ExportOptions& options) {
+  return {options.volume.path, options.operation,   options.registration,
+          options.views,       options.deformation, options.model_pose};
+}
+
+/// Takes away what an earlier export wrote there, and says so.
+Result<void> make_empty_of_export(const ExportOptions& options) {
+  const auto removed = make_empty(folder_of(options), inputs_of(options));
+  if (!removed) return removed.error();
+  if (!removed->empty())
+    print_notes({fmt::format("{}: replaced an earlier export ({})", options.out.string(), fmt::join(*removed, ", "))});
   return {};
 }
 
@@ -197,12 +200,12 @@ Result<ExitCode> run(const ExportOptions& options) {
         "give what was registered: --registration of register fiducials, --views of register views, or both; or "
         "the --operation that a live window kept"};
   }
+  if (auto is_free = check_free(folder_of(options), inputs_of(options)); !is_free) return is_free.error();
   const auto registered = read_registered(options);
   if (!registered) return registered.error();
   const auto map = map_of(options, *registered);
   if (!map) return map.error();
-  if (auto made = make_folder_durably(options.out); !made) return made.error();
-  if (auto removed = remove_earlier_export(options.out); !removed) return removed.error();
+  if (auto emptied = make_empty_of_export(options); !emptied) return emptied.error();
 
   nlohmann::json files = nlohmann::json::object();
   double worst_mm = 0;

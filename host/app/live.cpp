@@ -357,8 +357,10 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command->add_option("--tip", options->tip, "the pointer's tip, by calibrate tip; else by the calibration record")
       ->type_name("FILE");
   command->add_option("--scope", options->live.scope, "the scope's bird (default scope)");
-  command->add_option("--rod-angle", options->live.rod_angle_deg,
-                      "of a scope whose rod turns, degrees, as it is read off; Page Up and Page Down turn it on");
+  command
+      ->add_option("--rod-angle", options->live.rod_angle_deg,
+                   "of a scope whose rod turns, degrees, as it is read off; Page Up and Page Down turn it on")
+      ->check(CLI::Range(-360.0, 360.0));
   command->add_option("--pointer", options->live.pointer, "the pointer's bird (default pointer)");
   command->add_flag("!--no-motion-check", options->live.video_must_agree,
                     "of a scene without any pattern, as a plain phantom: do not wait until the video has been seen to "

@@ -1,3 +1,4 @@
+#include "drivers/system/number_options.hpp"
 #include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/confine/run_confined.hpp"
@@ -24,5 +25,6 @@ int main(int argc, char** argv) {
   add_verify(app, status);
   add_volume(app, status);
   refuse_outputs_over_inputs(app);
+  birdseye::refuse_odd_numbers(app);
   return birdseye::run_program<CLI::ParseError>(app, argc, argv, [&status] { return static_cast<int>(status.code); });
 }

@@ -5,6 +5,7 @@
 
 #include "device/wire/pairing.hpp"
 #include "drivers/identity/identity_folder.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/link/appliance_link.hpp"
 
@@ -27,7 +28,7 @@ Result<void> pair(const PairOptions& options) {
   const auto paired =
       wire::pair_as_client({*folder, name, wire::ask_people}, server->host, server->port, Deadline::after(kWithin));
   if (!paired) return paired.error().with_context("pair");
-  fmt::print("paired with {}, in {}\n", paired->name, folder->string());
+  print_line(fmt::format("paired with {}, in {}", paired->name, folder->string()));
   return {};
 }
 

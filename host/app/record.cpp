@@ -110,7 +110,6 @@ Result<ExitCode> run(const RecordOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
   note_interrupts();
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
-  ::signal(SIGXFSZ, SIG_IGN);  // a limit on files' sizes is told as a full disk is
   auto machine = ThisMachine::open();
   if (!machine) return machine.error();
   wire::ForeignSettings foreign = options.foreign;

@@ -31,12 +31,12 @@ struct RegisterFiducialsOptions {
 void print(const FiducialInput& input, const FiducialsFound& out, const Verdict& verdict) {
   for (const std::string& note : input.notes) print_line(note);
   for (std::size_t i = 0; i < input.touched_mm.size(); ++i) {
-    fmt::print("fiducial {:2}", i + 1);
-    if (!input.names.empty()) fmt::print(" ({})", input.names[i]);
-    if (!input.ct_of_touch.empty()) fmt::print(" is CT marker {:2}", input.ct_of_touch[i] + 1);
-    fmt::print("  residual {:6.3f} mm", out.fit.residuals_mm[i]);
-    if (!out.fit.leave_one_out_mm.empty()) fmt::print("  left out {:6.3f} mm", out.fit.leave_one_out_mm[i]);
-    fmt::print("\n");
+    std::string line = fmt::format("fiducial {:2}", i + 1);
+    if (!input.names.empty()) line += fmt::format(" ({})", input.names[i]);
+    if (!input.ct_of_touch.empty()) line += fmt::format(" is CT marker {:2}", input.ct_of_touch[i] + 1);
+    line += fmt::format("  residual {:6.3f} mm", out.fit.residuals_mm[i]);
+    if (!out.fit.leave_one_out_mm.empty()) line += fmt::format("  left out {:6.3f} mm", out.fit.leave_one_out_mm[i]);
+    print_line(line);
   }
   fmt::print("FRE {:.4f} mm rms, localisation error {:.2f} mm", out.fit.fre_rms_mm, out.localisation.rms_mm);
   if (out.localisation.degrees_of_freedom > 0) fmt::print(" (95 % sure: under {:.2f} mm)", out.localisation.upper95_mm);
@@ -47,7 +47,7 @@ void print(const FiducialInput& input, const FiducialsFound& out, const Verdict&
   }
   for (const calibration::OddPoint& p : out.odd.named) print_line(fmt::format("fiducial {} {}", p.index + 1, p.reason));
   for (const std::string& reason : verdict.reasons) print_line(reason);
-  for (const std::string& step : verdict.next_steps) fmt::print("next: {}\n", step);
+  for (const std::string& step : verdict.next_steps) print_line(fmt::format("next: {}", step));
   fmt::print("verdict: {}\n", name_of(verdict.grade));
 }
 

@@ -8,11 +8,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <regex>
 
 #include "calibration/record/sha256.hpp"
 #include "drivers/system/clock.hpp"
-#include "drivers/system/durable.hpp"
 #include "drivers/system/program.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
@@ -24,6 +22,7 @@
 #include "host/case/run_registration.hpp"
 #include "host/files/files_sha256.hpp"
 #include "host/files/picture.hpp"
+#include "host/files/result_folder.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/overlay/frame_painter.hpp"
@@ -267,32 +266,17 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
   return files;
 }
 
-/// Makes the folder, and removes the results of an earlier registration from it, which nobody must take for this one's.
-Result<void> make_empty_of_results(const fs::path& folder) {
-  if (auto made = make_folder_durably(folder); !made) return made;
-  std::error_code error;
-  std::vector<fs::path> old;
-  for (const char* name : {"field.mha", "result.json", "report.html", "expected_error.png", "trace.svg", "pose.txt"})
-    old.push_back(folder / name);
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    static const std::regex kOfAView("view[0-9]+((_difference)?_(before|after)|_outlines)\\.png");
-    if (std::regex_match(entry.path().filename().string(), kOfAView)) old.push_back(entry.path());
-  }
-  for (const fs::path& path : old) {
-    fs::remove(path, error);
-    if (error) {
-      return Error{Errc::unreadable, fmt::format("{}: is of an earlier registration and cannot be removed; "
-                                                 "choose another folder",
-                                                 path.string())};
-    }
-  }
-  return {};
+ResultFolder folder_of(const RegisterViewsOptions& options) {
+  return {options.out, "register views", "result.json",
+          "field\\.mha|report\\.html|expected_error\\.png|trace\\.svg|pose\\.txt|"
+          "view[0-9]+((_difference)?_(before|after)|_outlines)\\.png"};
 }
 
 /// The organ is not in the pictures where it should be: that is a verdict too.
 Result<ExitCode> write_nothing_found(const RegisterViewsOptions& options, const Error& why) {
-  if (auto made = make_empty_of_results(options.out); !made) return made.error();
-  const std::string text = text_of({{"verdict", name_of(Grade::fail)}, {"reasons", {why.what}}});
+  if (auto emptied = make_empty(folder_of(options), {options.file}); !emptied) return emptied.error();
+  const std::string text =
+      text_of({{"verdict", name_of(Grade::fail)}, {"reasons", {why.what}}, {"files", nlohmann::json::array()}});
   if (auto written = write_files({{options.out / "result.json", text}, {options.json, text}}); !written)
     return written.error();
   fmt::print("{}: {}\nverdict: {}\n", options.file.string(), why.what, name_of(Grade::fail));
@@ -301,6 +285,7 @@ Result<ExitCode> write_nothing_found(const RegisterViewsOptions& options, const 
 
 Result<ExitCode> run(const RegisterViewsOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
+  if (auto is_free = check_free(folder_of(options), {options.file}); !is_free) return is_free.error();
   auto read = read_case(options.file);
   if (!read) return read.error();
   const RegistrationCase& c = *read;
@@ -318,7 +303,7 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   const Verdict verdict = verdict_of(c, found);
   json["verdict"] = name_of(verdict.grade);
   json["reasons"] = verdict.reasons;
-  if (auto made = make_empty_of_results(options.out); !made) return made.error();
+  if (auto emptied = make_empty(folder_of(options), {options.file}); !emptied) return emptied.error();
   if (auto written = write_field(options.out / "field.mha", found.field); !written) return written.error();
   const std::string pose =
       "# patient_from_model: a deformed place of the model's frame -> the patient frame of the given poses, mm\n" +
@@ -335,8 +320,10 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
     files->push_back({"expected_error.png", png_of(errors->view())});
   files->push_back({"trace.svg", trace_svg(found.trace)});
   files->push_back({"report.html", registration_report(c, found, verdict, json)});
-  files->push_back({"result.json", text_of(json)});
   if (c.refine_pose) files->push_back({"pose.txt", pose});
+  json["files"] = nlohmann::json::array({"field.mha"});
+  for (const FileText& file : *files) json["files"].push_back(file.path.string());
+  files->push_back({"result.json", text_of(json)});
   for (FileText& file : *files) file.path = options.out / file.path;
   files->push_back({options.json, text_of(json)});
   if (auto written = write_files(*files); !written) return written.error();
@@ -344,8 +331,8 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   for (const std::string& note : c.notes) print_line(note);
   for (std::size_t n = 0; n < found.matched.size(); ++n) {
     if (!found.matched[n].thought_wrong()) continue;
-    fmt::print("{} is {:.1f} mm off all else and was thought to be wrong: check its places\n", c.matched[n].name,
-               found.matched[n].off_mm);
+    print_line(fmt::format("{} is {:.1f} mm off all else and was thought to be wrong: check its places",
+                           c.matched[n].name, found.matched[n].off_mm));
   }
   if (json.contains("tre_after_mm_mean")) {
     fmt::print("target error {:.2f} mm before, {:.2f} mm after (mean of {} landmarks)\n",

@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/app/overlay_options.hpp"
@@ -118,10 +119,9 @@ Result<void> check_taken_with(const RenderOptions& options, const Operation& ope
   for (const auto& [name, value] : calibrated.found_with.camera)
     camera += fmt::format("{}{} {}", camera.empty() ? " (" : ", ", name, value);
   if (!camera.empty()) camera += ")";
-  fmt::print(
-      "nothing tells whether {} was taken with the operation's scope and camera{}, and with --pose: that is as you "
-      "say\n",
-      options.over.string(), camera);
+  print_line(fmt::format(
+      "nothing tells whether {} was taken with the operation's scope and camera{}, and with --pose: that is as you say",
+      options.over.string(), camera));
   return {};
 }
 
@@ -142,8 +142,8 @@ Result<Operation> operation_of(const RenderOptions& options) {
   if (!authors) return authors.error();
   auto operation = read_operation(options.operation, *authors);
   if (operation && !operation->doubt.empty()) {
-    fmt::print(stderr, "birdseye: --operation {}: {}\n", options.operation.string(),
-               words("why_unsigned", words("unsigned_operation"), operation->doubt));
+    print_error("birdseye", fmt::format("--operation {}: {}", options.operation.string(),
+                                        words("why_unsigned", words("unsigned_operation"), operation->doubt)));
   }
   return operation;
 }

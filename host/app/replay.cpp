@@ -10,7 +10,6 @@
 
 #include "calibration/base/verdict.hpp"
 #include "drivers/system/clock.hpp"
-#include "drivers/system/durable.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "drivers/system/program.hpp"
 #include "drivers/system/progress.hpp"
@@ -19,6 +18,7 @@
 #include "host/app/overlay_options.hpp"
 #include "host/files/files_sha256.hpp"
 #include "host/files/registration_file.hpp"
+#include "host/files/result_folder.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/reference_sensor.hpp"
 #include "host/operation/replay_player.hpp"
@@ -156,8 +156,39 @@ Result<void> play(RecordingReader& reader, const ReplayOptions& options, ReplayH
   }
 }
 
+/// What it was replayed by. Of which CT it is, and how well it fits, it says only where that was found here or where
+/// the file that brought it says so: what a person vouches for is not sealed.
+RegistrationFile registration_of(const ReplaySetup& setup, const std::string& ct_sha256) {
+  RegistrationFile out{setup.setup().tracker_from_patient().inverse()};
+  if (setup.by_touches) {
+    out.ct_sha256 = ct_sha256;
+    out.fre_mm = setup.by_touches->fre_mm;
+  } else if (setup.by_file) {
+    out.ct_sha256 = setup.by_file->ct_sha256;
+    out.fre_mm = setup.by_file->fre_mm;
+  }
+  return out;
+}
+
+ResultFolder folder_of(const ReplayOptions& options) {
+  return {options.out, "replay", "replay.json",
+          "frames\\.csv|patient_from_tracker\\.txt|overlay-[0-9]{6,}\\.png|overlay\\.mp4", "pictures_crc32"};
+}
+
+/// Those that may lie in the folder by a name of a replay's.
+std::vector<fs::path> files_read(const ReplayOptions& options) {
+  const ReplayInputs& inputs = options.inputs;
+  return {inputs.patient_from_tracker,
+          inputs.tracker_from_patient,
+          inputs.camera_from_sensor,
+          inputs.patient_from_model,
+          inputs.fiducials,
+          options.live_log};
+}
+
 Result<ExitCode> run(ReplayOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
+  if (auto is_free = check_free(folder_of(options), files_read(options)); !is_free) return is_free.error();
   auto authors = Authors::of_this_machine(options.accept_unsigned);
   if (!authors) return authors.error();
   options.inputs.authors = *std::move(authors);
@@ -219,7 +250,7 @@ Result<ExitCode> run(ReplayOptions& options) {
     if (!decisions) return decisions.error().with_context("--live-log");
     for (LoggedDecision& decision : *decisions) live.insert_or_assign(decision.sequence, std::move(decision));
   }
-  if (auto made = make_folder_durably(options.out); !made) return made.error();
+  if (auto emptied = make_empty(folder_of(options), files_read(options)); !emptied) return emptied.error();
   note_interrupts();
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   Progress progress;
@@ -234,9 +265,11 @@ Result<ExitCode> run(ReplayOptions& options) {
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
   if (auto finished = player.finish(); !finished) return finished.error();
   const Verdict verdict = judge(player.done(), **reader, *setup, trust, remedies, options.motion_check);
-  const std::string json = text_of(json_of(player.done(), *setup, trust, (*engine)->name(), shown->notes, verdict));
-  const std::string registration =
-      registration_text({setup->setup().tracker_from_patient().inverse(), shown->ct_sha256, "", setup->fre_mm});
+  nlohmann::json figures = json_of(player.done(), *setup, trust, (*engine)->name(), shown->notes, verdict);
+  figures["files"] = files_of(folder_of(options));  // the next replay may replace these, and no others
+  for (const char* name : {"frames.csv", "patient_from_tracker.txt"}) figures["files"].push_back(name);
+  const std::string json = text_of(figures);
+  const std::string registration = registration_text(registration_of(*setup, shown->ct_sha256));
   if (auto written = write_files({{options.out / "frames.csv", player.done().table},
                                   {options.out / "patient_from_tracker.txt", registration},
                                   {options.out / "replay.json", json},
@@ -277,8 +310,10 @@ std::vector<CLI::Option*> add_inputs(CLI::App& command, ReplayInputs& inputs) {
                                  "how well the lens is known, where no calibration record says"),
               command.add_option("--hand-eye-rms-px", inputs.held_out_px, "and hand-eye"),
               command.add_option("--fre-mm", inputs.fre_mm, "and the registration")});
-  command.add_option("--rod-angle", inputs.rod_angle_deg,
-                     "of a scope whose rod turns, degrees, as it was read off when it was recorded");
+  command
+      .add_option("--rod-angle", inputs.rod_angle_deg,
+                  "of a scope whose rod turns, degrees, as it was read off when it was recorded")
+      ->check(CLI::Range(-360.0, 360.0));
   return out;
 }
 

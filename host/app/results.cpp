@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "drivers/system/program.hpp"
-#include "host/files/write_files.hpp"
 #include "host/link/appliance_hardware.hpp"
 #include "host/texts/texts.hpp"
 
@@ -126,18 +125,19 @@ void tell_not_written(const std::filesystem::path& path) {
 }
 
 void finish_calibration(const ResultPaths& paths, const std::string& out_text, nlohmann::json json, HtmlPage page,
-                        const Verdict& verdict, CommandStatus& status, const RecordEntry& entry) {
+                        const Verdict& verdict, CommandStatus& status, const RecordEntry& entry,
+                        const FileText& always) {
   json["verdict"] = name_of(verdict.grade);
   json["reasons"] = verdict.reasons;
   json["next_steps"] = verdict.next_steps;
   page.set_verdict(verdict);
-  std::vector<FileText> files{{paths.json, text_of(json)}, {paths.report, page.html()}};
+  std::vector<FileText> files{{paths.json, text_of(json)}, {paths.report, page.html()}, always};
   if (verdict.grade != Grade::fail) {
     files.push_back({paths.out, out_text});
     if (!paths.record.empty()) {
       const auto record = record_of(paths, entry, verdict.grade);
       if (!record) {  // what was found is not lost for it
-        (void)write_files({{paths.json, text_of(json)}, {paths.report, page.html()}, {paths.out, out_text}});
+        (void)write_files({{paths.json, text_of(json)}, {paths.report, page.html()}, {paths.out, out_text}, always});
         return status.refuse(record.error());
       }
       files.push_back({paths.record, *record});

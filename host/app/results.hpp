@@ -10,6 +10,7 @@
 #include "host/app/commands.hpp"
 #include "host/files/field_files.hpp"
 #include "host/files/record_file.hpp"
+#include "host/files/write_files.hpp"
 #include "host/recording/recording_signature.hpp"
 #include "host/report/html_page.hpp"
 
@@ -48,8 +49,10 @@ void tell_not_written(const std::filesystem::path& path);
 
 /// Prints grade, reasons and next steps; writes json with `verdict`, `reasons` and `next_steps` added, and the page.
 /// Unless the grade is fail, out_text goes to --out and the entry into --record: a worthless result is not left where
-/// it could be used. Sets status by the grade, or to the error of a file that cannot be written.
+/// it could be used. `always` is written with them, whatever the grade is. Sets status by the grade, or to the error of
+/// a file that cannot be written: then none is.
 void finish_calibration(const ResultPaths& paths, const std::string& out_text, nlohmann::json json, HtmlPage page,
-                        const Verdict& verdict, CommandStatus& status, const RecordEntry& entry = {});
+                        const Verdict& verdict, CommandStatus& status, const RecordEntry& entry = {},
+                        const FileText& always = {});
 
 }  // namespace birdseye::host

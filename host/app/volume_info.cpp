@@ -136,13 +136,13 @@ void print_series(const SeriesList& list, nlohmann::json& json) {
     print_line(line_of(info));
     json["series"].push_back(json_of(info));
   }
-  for (const std::string& unreadable : list.unreadable) fmt::print("passed over  {}\n", unreadable);
+  for (const std::string& unreadable : list.unreadable) print_line(fmt::format("passed over  {}", unreadable));
   if (!list.unreadable.empty()) json["unreadable"] = list.unreadable;
 }
 
 void print_labels(const std::vector<NamedLabel>& labels, nlohmann::json& json) {
   for (const NamedLabel& label : labels) {
-    fmt::print("label        {:<4} {}\n", label.number, label.name.empty() ? "-" : label.name);
+    print_line(fmt::format("label        {:<4} {}", label.number, label.name.empty() ? "-" : label.name));
     json["labels"].push_back({{"number", label.number}, {"name", label.name}});
   }
 }

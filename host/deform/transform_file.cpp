@@ -9,9 +9,7 @@
 #include <itkTransformFileWriter.h>
 #include <itkTxtTransformIO.h>
 
-#include <system_error>
-
-#include "drivers/system/durable.hpp"
+#include "drivers/system/part_file.hpp"
 
 namespace birdseye::host {
 
@@ -83,12 +81,13 @@ Eigen::Vector3d RestMap::operator()(const Eigen::Vector3d& seen_mm) const {
 Result<void> write_transform(const fs::path& path, const RestMap& map) {
   const auto io = io_for(path);
   if (io == nullptr) return refused(Errc::bad_value, path, "name it .tfm or .h5");
-  const fs::path part = path.parent_path() / fmt::format("part-{}", path.filename().string());
+  auto part = PartFile::make(path);
+  if (!part) return part.error();
   try {
     const auto affine = affine_of(map.ct_from_seen);
     const auto writer = itk::TransformFileWriterTemplate<double>::New();
     writer->SetTransformIO(io);
-    writer->SetFileName(part.string());
+    writer->SetFileName(part->path().string());
     if (map.field == nullptr) {
       writer->SetInput(affine);
     } else {
@@ -99,10 +98,8 @@ Result<void> write_transform(const fs::path& path, const RestMap& map) {
       writer->SetInput(both);
     }
     writer->Update();
-    return replace_durably(part, path);
+    return part->put_durably();
   } catch (const std::exception&) {
-    std::error_code ignored;
-    fs::remove(part, ignored);
     return refused(Errc::unreadable, path,
                    "cannot be written; check the folder and its permissions, and whether the disk is full");
   }

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
 #include <sstream>
 #include <string>
 #include <system_error>
 
-#include "drivers/system/durable.hpp"
 #include "host/files/frame_size.hpp"
 
 namespace birdseye::host {
@@ -80,13 +80,15 @@ std::string size_of_ppm(const std::string& bytes) {
   return "of an unknown number of";
 }
 
+std::filesystem::path log_of(const PartFile& film) {
+  return film.path().string() + ".log";
+}
+
 }  // namespace
 
 Result<Film> Film::open(const std::filesystem::path& path, int width_px, int height_px, double rate_hz) {
-  std::filesystem::path temporary = path;
-  temporary.replace_extension(".part.mp4");
-  std::filesystem::path log = path;
-  log.replace_extension(".ffmpeg.log");
+  Result<PartFile> part = PartFile::make(path);
+  if (!part) return std::move(part).error();
   // yuv420p and an even size are what browsers play; faststart lets them start before the whole file is read.
   Result<ChildProcess> encoder =
       ChildProcess::start({"ffmpeg",
@@ -116,33 +118,39 @@ Result<Film> Film::open(const std::filesystem::path& path, int width_px, int hei
                            "yuv420p",
                            "-movflags",
                            "+faststart",
-                           temporary.string()},
-                          log, ChildProcess::Pipe::stdin_to_child, ChildProcess::Signals::ours_alone);
+                           "-f",
+                           "mp4",
+                           part->path().string()},
+                          log_of(*part), ChildProcess::Pipe::stdin_to_child, ChildProcess::Signals::ours_alone);
   if (!encoder) return std::move(encoder).error();
-  return Film(std::move(*encoder), path, temporary,
+  return Film(std::move(*part), std::move(*encoder),
               static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px) * 3);
 }
 
 Result<void> Film::add(std::span<const std::uint8_t> rgb) {
   if (rgb.size() != frame_bytes_) {
-    return Error{Errc::bad_value, fmt::format("{}: a frame of {} bytes where the film's are {}", path_.string(),
+    return Error{Errc::bad_value, fmt::format("{}: a frame of {} bytes where the film's are {}", part_.place().string(),
                                               rgb.size(), frame_bytes_)};
   }
-  return encoder_.write(rgb.data(), rgb.size(), Deadline::after(kEncoderPatience));
+  auto taken = encoder_.write(rgb.data(), rgb.size(), Deadline::after(kEncoderPatience));
+  if (taken || taken.error().code != Errc::disconnected) return taken;
+  (void)encoder_.wait(Deadline::after(kEncoderPatience));  // then it has said why
+  return unfinished();
+}
+
+Error Film::unfinished() const {
+  std::ifstream log(log_of(part_));
+  std::string why;
+  std::getline(log, why);
+  return {Errc::io, fmt::format("{}: ffmpeg did not finish it ({}); check whether the disk is full",
+                                part_.place().string(), why.empty() ? "it does not say why" : why)};
 }
 
 Result<void> Film::finish() {
   encoder_.close_pipe();
   const std::optional<int> code = encoder_.wait(Deadline::after(kEncoderPatience));
-  std::filesystem::path log = path_;
-  log.replace_extension(".ffmpeg.log");
-  if (code != 0) {
-    return Error{Errc::io, fmt::format("{}: ffmpeg did not finish it; see {}", path_.string(), log.string())};
-  }
-  if (auto replaced = replace_durably(temporary_, path_); !replaced) return replaced;
-  std::error_code ignored;
-  std::filesystem::remove(log, ignored);
-  return {};
+  if (code != 0) return unfinished();
+  return part_.put_durably();
 }
 
 Result<FilmReader> FilmReader::open(const std::filesystem::path& path, int width_px, int height_px) {

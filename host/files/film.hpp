@@ -7,10 +7,12 @@
 
 #include "calibration/base/result.hpp"
 #include "drivers/system/child_process.hpp"
+#include "drivers/system/part_file.hpp"
 
 namespace birdseye::host {
 
-/// An H.264 film in an MP4 file, encoded by the ffmpeg program. The file appears under its name when the film is whole.
+/// An H.264 film in an MP4 file, encoded by the ffmpeg program. The file appears under its name when the film is whole;
+/// of one that does not get there nothing is left.
 class Film {
  public:
   static Result<Film> open(const std::filesystem::path& path, int width_px, int height_px, double rate_hz);
@@ -20,15 +22,13 @@ class Film {
   Result<void> finish();
 
  private:
-  Film(ChildProcess encoder, std::filesystem::path path, std::filesystem::path temporary, std::size_t frame_bytes)
-      : encoder_(std::move(encoder)),
-        path_(std::move(path)),
-        temporary_(std::move(temporary)),
-        frame_bytes_(frame_bytes) {}
+  Film(PartFile part, ChildProcess encoder, std::size_t frame_bytes)
+      : part_(std::move(part)), encoder_(std::move(encoder)), frame_bytes_(frame_bytes) {}
+  /// Why, in the encoder's words where it has any.
+  [[nodiscard]] Error unfinished() const;
 
-  ChildProcess encoder_;
-  std::filesystem::path path_;
-  std::filesystem::path temporary_;
+  PartFile part_;
+  ChildProcess encoder_;  ///< ends before its file is removed
   std::size_t frame_bytes_;
 };
 

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/record/sha256.hpp"
 #include "drivers/system/whole_file.hpp"
 #include "host/files/text_files.hpp"
@@ -78,6 +79,8 @@ Result<RegistrationFile> read_registration(const fs::path& path) {
   out.ct_sha256 = text_at("ct_sha256");
   out.made_utc = text_at("made_utc");
   if (facts->contains("fre_mm") && (*facts)["fre_mm"].is_number()) out.fre_mm = (*facts)["fre_mm"].get<double>();
+  if (out.fre_mm && !is_measured_error(*out.fre_mm))
+    return refused({Errc::bad_format, fmt::format("its fre_mm is {:g}, which no measurement gives", *out.fre_mm)});
   return out;
 }
 

@@ -2,12 +2,16 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <system_error>
+#include <utility>
 
 #include "calibration/record/strict_json.hpp"
 #include "drivers/system/durable.hpp"
@@ -19,69 +23,129 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path part_of(const fs::path& path) {
-  return path.string() + ".part";
+/// A path by which the same file is always named: links are followed in its folder, not in its own name.
+fs::path place_of(const fs::path& path) {
+  std::error_code ignored;
+  return fs::weakly_canonical(fs::absolute(path, ignored).parent_path(), ignored) / path.filename();
 }
 
-/// flags: O_EXCL for a file that is made here, and nothing for a device or a pipe that is there, which is not waited
-/// for: one that nobody reads is refused.
-Result<void> put(const fs::path& path, const std::string& text, int flags, const fs::path& named) {
-  const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK | flags, 0666));
-  if (!fd && errno == ENXIO)
-    return Error{Errc::unreadable, fmt::format("{}: nobody reads this pipe; start its reader first", named.string())};
-  if (!fd && errno == EEXIST)
-    return Error{Errc::unreadable, fmt::format("{}: is in the way; remove it", path.string())};
-  bool written = static_cast<bool>(fd);
-  if (written && ::fcntl(fd.get(), F_SETFL, 0) != 0) written = false;
-  for (std::size_t at = 0; written && at < text.size();) {
-    const ssize_t wrote = ::write(fd.get(), text.data() + at, text.size() - at);
-    if (wrote < 0 && errno == EINTR) continue;
-    written = wrote > 0;
-    if (written) at += static_cast<std::size_t>(wrote);
+bool is_in(const fs::path& place, const char* folder) {
+  const fs::path way = place.lexically_relative(folder);
+  return !way.empty() && *way.begin() != "." && *way.begin() != "..";
+}
+
+/// The link in /dev or /proc that a path names, maybe through further links, as /dev/stdout does; empty: it names none.
+fs::path system_link_of(fs::path path) {
+  constexpr int kMostLinks = 40;  // more than the kernel follows
+  std::error_code error;
+  fs::path found;
+  for (int n = 0; n < kMostLinks && fs::is_symlink(path, error); ++n) {
+    path = place_of(path);
+    if (is_in(path, "/proc") || is_in(path, "/dev")) found = path;
+    const fs::path to = fs::read_symlink(path, error);
+    if (error) break;
+    path = path.parent_path() / to;
   }
-  if (written) return {};
-  return Error{Errc::unreadable,
-               fmt::format("{}: cannot be written; check the folder, its permissions, and whether the disk is full",
-                           named.string())};
+  return found;
 }
 
-/// Beside the file, in a file of its own: whatever lay there under that name, as a link to another file, is not written
-/// to.
-Result<void> put_part(const FileText& file) {
-  const fs::path part = part_of(file.path);
-  (void)::unlink(part.c_str());  // where it cannot be removed, O_EXCL refuses it
-  return put(part, file.text, O_EXCL | O_NOFOLLOW, file.path);
+/// Whether it is written to as it is, and not replaced.
+bool stays(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_other(path, ignored) || !system_link_of(path).empty();
+}
+
+/// What a path has open that names a descriptor of this program, as /dev/stdout does: so that what is written goes on
+/// where this program's own lines end.
+UniqueFd own_descriptor(const fs::path& path) {
+  const fs::path link = system_link_of(path);
+  if (link.parent_path() != place_of("/proc/self/fd/0").parent_path()) return UniqueFd();
+  int number = -1;
+  const std::string name = link.filename().string();
+  if (std::from_chars(name.data(), name.data() + name.size(), number).ec != std::errc()) return UniqueFd();
+  return UniqueFd(::fcntl(number, F_DUPFD_CLOEXEC, 0));
+}
+
+Error cannot_be_written(const fs::path& named) {
+  return {Errc::unreadable,
+          fmt::format("{}: cannot be written; check the folder, its permissions, and whether the disk is full",
+                      named.string())};
+}
+
+Result<void> put(const UniqueFd& fd, const FileText& file) {
+  if (!fd) return cannot_be_written(file.path);
+  for (std::size_t at = 0; at < file.text.size();) {
+    const ssize_t wrote = ::write(fd.get(), file.text.data() + at, file.text.size() - at);
+    if (wrote < 0 && errno == EINTR) continue;
+    if (wrote <= 0) return cannot_be_written(file.path);
+    at += static_cast<std::size_t>(wrote);
+  }
+  return {};
+}
+
+/// Into a device or a pipe that is there. It is not waited for: one that nobody reads is refused.
+Result<void> put_as_it_is(const FileText& file) {
+  if (const UniqueFd own = own_descriptor(file.path)) return put(own, file);
+  const UniqueFd fd(::open(file.path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC | O_NOCTTY | O_NONBLOCK));
+  if (!fd && errno == ENXIO)
+    return Error{Errc::unreadable,
+                 fmt::format("{}: nobody reads this pipe; start its reader first", file.path.string())};
+  if (fd && ::fcntl(fd.get(), F_SETFL, O_APPEND) != 0) return cannot_be_written(file.path);
+  return put(fd, file);
+}
+
+/// Beside the file, in a file of its own by a name that nobody has: what lies there is left alone. It gets the mode of
+/// the file that it replaces. part: gets its path.
+Result<void> put_part(const FileText& file, fs::path& part) {
+  static std::atomic<unsigned> made{0};
+  struct stat former {};
+  const bool replaces = ::stat(file.path.c_str(), &former) == 0;
+  const mode_t mode = replaces ? former.st_mode & 0777U : 0666U;
+  UniqueFd fd;
+  do {
+    part = fmt::format("{}.{}-{}.part", file.path.string(), ::getpid(), made++);
+    fd = UniqueFd(::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
+  } while (!fd && errno == EEXIST);
+  if (!fd) part.clear();
+  if (fd && replaces && ::fchmod(fd.get(), mode) != 0) return cannot_be_written(file.path);
+  return put(fd, file);
 }
 
 }  // namespace
 
+bool same_file(const fs::path& a, const fs::path& b) {
+  std::error_code ignored;
+  return place_of(a) == place_of(b) || fs::equivalent(a, b, ignored);
+}
+
 Result<void> write_files(const std::vector<FileText>& files) {
   std::error_code ignored;
-  std::vector<const FileText*> replaced;
+  std::vector<std::pair<const FileText*, fs::path>> replaced;  // with what replaces it
   const auto give_up = [&](Error error) {
-    for (const FileText* file : replaced) fs::remove(part_of(file->path), ignored);
+    for (const auto& [file, part] : replaced) fs::remove(part, ignored);
     return error;
   };
   for (std::size_t i = 0; i < files.size(); ++i) {
+    if (files[i].path.empty() || stays(files[i].path)) continue;
     for (std::size_t j = 0; j < i; ++j) {
-      if (!files[i].path.empty() && files[i].path == files[j].path) {
+      if (!files[j].path.empty() && same_file(files[i].path, files[j].path)) {
         return Error{Errc::bad_value, fmt::format("{}: is named twice; give two files", files[i].path.string())};
       }
     }
   }
   for (const FileText& file : files) {
-    if (file.path.empty() || fs::is_other(file.path, ignored)) continue;
+    if (file.path.empty() || stays(file.path)) continue;
     if (fs::is_directory(file.path, ignored)) {
       return give_up({Errc::unreadable, fmt::format("{}: is a folder; give a file", file.path.string())});
     }
-    replaced.push_back(&file);
-    if (auto written = put_part(file); !written) return give_up(written.error());
-    if (auto synced = sync_file(part_of(file.path)); !synced) return give_up(synced.error());
+    fs::path& part = replaced.emplace_back(&file, fs::path()).second;
+    if (auto written = put_part(file, part); !written) return give_up(written.error());
+    if (auto synced = sync_file(part); !synced) return give_up(synced.error());
   }
   std::set<fs::path> folders;
-  for (const FileText* file : replaced) {
+  for (const auto& [file, part] : replaced) {
     std::error_code error;
-    fs::rename(part_of(file->path), file->path, error);
+    fs::rename(part, file->path, error);
     if (error) return give_up({Errc::unreadable, fmt::format("{}: cannot be replaced", file->path.string())});
     folders.insert(file->path.parent_path());
   }
@@ -89,8 +153,8 @@ Result<void> write_files(const std::vector<FileText>& files) {
     if (auto synced = sync_folder(folder); !synced) return synced;
   }
   for (const FileText& file : files) {
-    if (file.path.empty() || !fs::is_other(file.path, ignored)) continue;
-    if (auto written = put(file.path, file.text, 0, file.path); !written) return written;
+    if (file.path.empty() || !stays(file.path)) continue;
+    if (auto written = put_as_it_is(file); !written) return written;
   }
   return {};
 }

@@ -17,9 +17,12 @@ struct FileText {
 
 /// Writes all or none: first each to a temporary file beside its place and onto the disk, then all into their places,
 /// so that a reader, or whoever starts the machine after a power cut, finds of each file the old one or the whole new
-/// one. Pipes and devices are written to as they are. Empty paths are passed over.
+/// one. It gets the old one's mode. Pipes, devices, and links in /dev and /proc are written to as they are. Empty paths
+/// are passed over. Two that are the same file are refused before anything is written.
 Result<void> write_files(const std::vector<FileText>& files);
 Result<void> write_file(const std::filesystem::path& path, const std::string& text);
+/// Whether two paths name the same file, or would if it were there, whichever way they are spelled.
+bool same_file(const std::filesystem::path& a, const std::filesystem::path& b);
 /// Indented, with a final newline.
 std::string text_of(const nlohmann::json& json);
 

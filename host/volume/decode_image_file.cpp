@@ -14,7 +14,8 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/system/durable.hpp"
+#include "calibration/base/lower_case.hpp"
+#include "drivers/system/part_file.hpp"
 #include "drivers/system/process_copy.hpp"
 #include "host/confine/allowance.hpp"
 #include "host/volume/decode.hpp"
@@ -264,21 +265,30 @@ bool write_to(const fs::path& path, const ImageFile& image, StoredAs stored) {
   return write_voxels(*io, itk::IOComponentEnum::UCHAR, std::vector<std::uint8_t>(image.hu.begin(), image.hu.end()));
 }
 
+/// Of the two files that such a name stands for only one would come into its place.
+bool keeps_voxels_apart(const fs::path& path) {
+  const std::string name = lower_case(path.filename().string());
+  return names_other_files(path) || name.ends_with(".img") || name.ends_with(".img.gz");
+}
+
 }  // namespace
 
 Result<void> write_image(const fs::path& path, const ImageFile& image, StoredAs stored) {
   const CopiesHeldOff held;
   if (image_io(path, true) == nullptr) return refused(Errc::bad_value, path, "name it .nii.gz, .nrrd or .mha");
-  const fs::path part = path.parent_path() / fmt::format("part-{}", path.filename().string());
+  if (keeps_voxels_apart(path)) {
+    return refused(Errc::bad_value, path,
+                   "would keep its voxels in another file beside it; name it .nii.gz, .nrrd or .mha");
+  }
+  auto part = PartFile::make(path);
+  if (!part) return part.error();
   std::string fault;
   try {
-    if (!write_to(part, image, stored)) fault = "cannot be written whole; is the disk full?";
+    if (!write_to(part->path(), image, stored)) fault = "cannot be written whole; is the disk full?";
   } catch (const std::exception&) {
     fault = "cannot be written; check the folder and its permissions, and whether the disk is full";
   }
-  if (fault.empty()) return replace_durably(part, path);
-  std::error_code ignored;
-  fs::remove(part, ignored);
+  if (fault.empty()) return part->put_durably();
   return refused(Errc::unreadable, path, fault);
 }
 

@@ -45,7 +45,7 @@ Result<ImageFile> read_labels_file(const std::filesystem::path& path, const std:
 
 enum class StoredAs { uint8, int16, float32 };
 /// Writes, compressed, what read_image reads back: .nii.gz, .nrrd or .mha. Into its place comes only what is whole and
-/// on the disk, for it is read back first.
+/// on the disk, for it is read back first. Refuses, naming it, a place where there is something that is no file.
 Result<void> write_image(const std::filesystem::path& path, const ImageFile& image, StoredAs stored);
 
 }  // namespace birdseye::host

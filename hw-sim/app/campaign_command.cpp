@@ -7,7 +7,6 @@
 #include <string>
 
 #include "drivers/system/local_programs.hpp"
-#include "hw-sim/app/number_option.hpp"
 #include "hw-sim/campaign/campaign.hpp"
 
 namespace birdseye::hw_sim {
@@ -128,7 +127,7 @@ void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
       ->required();
   CLI::Option* const minutes =
       command.add_option("--minutes", options->operations.minutes, "how long each operation is")
-          ->check(number_within(0.5, 600.0));
+          ->check(CLI::Range(0.5, 600.0));
   CLI::Option* const pictures = command.add_flag("--pictures", options->operations.pictures,
                                                  "the video of each operation shows what the scope sees");
   command
@@ -137,7 +136,7 @@ void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
       ->check(CLI::Range(1, 1024));
   command.add_flag("--alone", options->alone, "run all seeds here, whatever has started this program beside others");
   command.add_option("--at-most", options->settings.at_most_s, "seconds after which no seed begins")
-      ->check(number_within(1.0, 1e6));
+      ->check(CLI::Range(1.0, 1e6));
   CLI::Option* const other =
       command
           .add_option("command", options->command,
@@ -148,7 +147,7 @@ void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
   command
       .add_option("--patience", options->patience_s, "seconds that the command may take for one seed (default 3600)")
       ->needs(other)
-      ->check(number_within(1.0, 1e6));
+      ->check(CLI::Range(1.0, 1e6));
   command.callback([options, take, &broken] { take(run(*options, broken)); });
 }
 

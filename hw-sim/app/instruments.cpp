@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "drivers/system/interrupt.hpp"
-#include "hw-sim/app/number_option.hpp"
+#include "hw-sim/app/kept_inputs.hpp"
 #include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/ftdi/ft232r_program.hpp"
 #include "hw-sim/minibird/program.hpp"
@@ -49,6 +49,7 @@ Result<void> finish(MiniBirdOptions& options) {
 }
 
 Result<void> run(MiniBirdOptions& options) {
+  if (auto kept = keep_inputs({options.program.truth}, {options.faults}); !kept) return kept;
   if (auto finished = finish(options); !finished) return finished;
   return run_minibird(options.program, note_interrupts());
 }
@@ -76,6 +77,7 @@ struct VideoOptions {
 
 Result<void> run(VideoOptions& options) {
   CameraProgram& program = options.program;
+  if (auto kept = keep_inputs({program.truth, program.strobe}, {options.faults, program.post}); !kept) return kept;
   if (auto parsed = parse_size(options.size, program.width_px, program.height_px); !parsed) return parsed;
   if (program.width_px % 2 != 0 || program.height_px % 2 != 0) {
     return Error{Errc::bad_value, "--size: give even numbers, as 1920x1080"};
@@ -117,19 +119,17 @@ void add_tracker_options(CLI::App& command, MiniBirdOptions& options) {
   command.add_option("--birds", tracker.unit.birds, "in the flock")->check(CLI::Range(1, 126));
   command.add_option("--motion", program.motion, "circle, pivot (a tip in a divot) or still")
       ->check(CLI::IsMember({"circle", "pivot", "still"}));
-  command.add_option("--period-s", program.period_s, "of the circle")->check(number_within(0.5, 3600.0));
+  command.add_option("--period-s", program.period_s, "of the circle")->check(CLI::Range(0.5, 3600.0));
   command.add_option("--position-noise-mm", tracker.noise.position_mm, "per axis and record")
-      ->check(number_within(0.0, 50.0));
-  command.add_option("--angle-noise-deg", tracker.noise.angle_deg, "per axis and record")
-      ->check(number_within(0.0, 20.0));
+      ->check(CLI::Range(0.0, 50.0));
+  command.add_option("--angle-noise-deg", tracker.noise.angle_deg, "per axis and record")->check(CLI::Range(0.0, 20.0));
   command.add_option("--distortion-mm", tracker.distortion_mm, "largest displacement by metal in the room")
-      ->check(number_within(0.0, 500.0));
-  command.add_option("--delay-ms", tracker.delay_ms, "from measurement to first byte")
-      ->check(number_within(0.0, 1000.0));
-  command.add_option("--jitter-ms", tracker.jitter_ms, kJitterHelp)->check(number_within(0.0, 1000.0));
-  command.add_option("--drift-ppm", tracker.drift_ppm, kDriftHelp)->check(number_within(-10'000.0, 10'000.0));
+      ->check(CLI::Range(0.0, 500.0));
+  command.add_option("--delay-ms", tracker.delay_ms, "from measurement to first byte")->check(CLI::Range(0.0, 1000.0));
+  command.add_option("--jitter-ms", tracker.jitter_ms, kJitterHelp)->check(CLI::Range(0.0, 1000.0));
+  command.add_option("--drift-ppm", tracker.drift_ppm, kDriftHelp)->check(CLI::Range(-10'000.0, 10'000.0));
   command.add_option("--boot-ms", tracker.boot_ms, "of silence after power-up and reset")
-      ->check(number_within(0.0, 60'000.0));
+      ->check(CLI::Range(0.0, 60'000.0));
   command.add_option("--baud", tracker.baud, "of its DIP switches: how long bytes take")
       ->check(CLI::IsMember({2400, 4800, 9600, 19200, 38400, 57600, 115200}));
   command.add_option("--revision", options.revision, "of its firmware, which says what parameters it knows");
@@ -150,7 +150,7 @@ void add_minibird_command(CLI::App& app, const Take& take) {
   line.add_option("--unix", program.unix_socket, "path of a Unix socket to listen at");
   add_tracker_options(command, *options);
   command.add_option("--truth", program.truth, "JSON file that says where the birds truly are, and when");
-  command.add_option("--seconds", program.seconds, "to run; 0: until SIGTERM")->check(number_within(0.0, 1e6));
+  command.add_option("--seconds", program.seconds, "to run; 0: until SIGTERM")->check(CLI::Range(0.0, 1e6));
   command.callback([options, take] { take(run(*options)); });
 }
 
@@ -180,15 +180,15 @@ void add_camera_command(CLI::App& app, const Take& take) {
   sink.add_option("--socket", program.socket, "path of a Unix socket to listen at");
   sink.add_option("--v4l2", program.device, "an output node of v4l2loopback, as /dev/video9");
   command.add_option("--size", options->size, "WIDTHxHEIGHT");
-  command.add_option("--rate", timing.rate_hz, "frames a second")->check(number_within(1.0, 240.0));
+  command.add_option("--rate", timing.rate_hz, "frames a second")->check(CLI::Range(1.0, 240.0));
   command.add_option("--format", options->format, "RGB3, YUYV, UYVY, NV12 or GREY");
   command.add_flag("--no-stamps", options->no_stamps, "frames do not say when they were exposed");
   command.add_option("--exposure-ms", timing.exposure_ms, "of a row; nothing leaves before it has ended")
-      ->check(number_within(0.0, 1000.0));
+      ->check(CLI::Range(0.0, 1000.0));
   command.add_option("--delivery-ms", timing.delivery_ms, "from mid-exposure to the first byte")
-      ->check(number_within(0.0, 1000.0));
-  command.add_option("--jitter-ms", timing.jitter_ms, kJitterHelp)->check(number_within(0.0, 1000.0));
-  command.add_option("--drift-ppm", timing.drift_ppm, kDriftHelp)->check(number_within(-10'000.0, 10'000.0));
+      ->check(CLI::Range(0.0, 1000.0));
+  command.add_option("--jitter-ms", timing.jitter_ms, kJitterHelp)->check(CLI::Range(0.0, 1000.0));
+  command.add_option("--drift-ppm", timing.drift_ppm, kDriftHelp)->check(CLI::Range(-10'000.0, 10'000.0));
   command.add_flag("--rolling", program.rolling, "rows are exposed one after another");
   command.add_option("--faults", options->faults, "script of faults (TOML)");
   command.add_option("--seed", timing.seed, "everything random follows from it");
@@ -198,7 +198,7 @@ void add_camera_command(CLI::App& app, const Take& take) {
   command.add_option(
       "--post", program.post,
       "--truth of a minibird on its circle: show what a scope on its first bird sees of a post in the middle");
-  command.add_option("--seconds", program.seconds, "to run; 0: until SIGTERM")->check(number_within(0.0, 1e6));
+  command.add_option("--seconds", program.seconds, "to run; 0: until SIGTERM")->check(CLI::Range(0.0, 1e6));
   command.callback([options, take] { take(run(*options)); });
 }
 

@@ -3,11 +3,12 @@
 #include <string>
 
 #include "drivers/system/interrupt.hpp"
+#include "drivers/system/number_options.hpp"
 #include "drivers/system/program.hpp"
 #include "drivers/system/starter.hpp"
 #include "hw-sim/app/campaign_command.hpp"
 #include "hw-sim/app/instruments.hpp"
-#include "hw-sim/app/number_option.hpp"
+#include "hw-sim/app/kept_inputs.hpp"
 #include "hw-sim/app/operation_command.hpp"
 #include "hw-sim/case/registration_case.hpp"
 #include "hw-sim/phantom/phantom.hpp"
@@ -50,7 +51,12 @@ int main(int argc, char** argv) {
                   "a CT to build on (DICOM folder, NIfTI, NRRD, MHA) in place of the procedural body");
   make.add_option("--labels", phantom.labels, "organ labels of that CT")->needs("--ct");
   make.add_option("--liver-label", phantom.liver_label, "the liver's value in the labels")->needs("--labels");
-  make.callback([&] { take(hw_sim::write_phantom(phantom)); });
+  make.callback([&] {
+    // A slice stands for the series that it lies in.
+    const auto kept = hw_sim::keep_inputs({phantom.folder / "ct", phantom.folder / "segmentation.nii.gz"},
+                                          {phantom.ct, phantom.ct.parent_path(), phantom.labels});
+    take(kept ? hw_sim::write_phantom(phantom) : kept);
+  });
 
   hw_sim::CartSettings cart;
   std::string size = "768x576";
@@ -60,22 +66,20 @@ int main(int argc, char** argv) {
   run.add_option("--tty", cart.tty, "name for the tracker's pseudo-terminal")->required();
   run.add_option("--out", cart.folder, "folder for cart.json and truth/")->required();
   run.add_option("--seed", cart.seed, "everything random follows from it");
-  run.add_option("--position-noise-mm", cart.noise.position_mm, "per axis and record")
-      ->check(hw_sim::number_within(0.0, 50.0));
-  run.add_option("--angle-noise-deg", cart.noise.angle_deg, "per axis and record")
-      ->check(hw_sim::number_within(0.0, 20.0));
+  run.add_option("--position-noise-mm", cart.noise.position_mm, "per axis and record")->check(CLI::Range(0.0, 50.0));
+  run.add_option("--angle-noise-deg", cart.noise.angle_deg, "per axis and record")->check(CLI::Range(0.0, 20.0));
   run.add_option("--deformation-mm", cart.deformation.amplitude_mm,
                  "how far the liver has moved since the CT, where it has moved most")
-      ->check(hw_sim::number_within(0.0, 30.0));
+      ->check(CLI::Range(0.0, 30.0));
   std::string cart_deformation;
   run.add_option("--deformation", cart_deformation, kDeformationKinds);
   run.add_option("--distortion-mm", cart.distortion_mm, "largest displacement by metal in the room")
-      ->check(hw_sim::number_within(0.0, 500.0));
+      ->check(CLI::Range(0.0, 500.0));
   run.add_option("--sway-s", cart.pace.sway_s, "how long the scope is first turned to and fro over the board")
-      ->check(hw_sim::number_within(0.0, 600.0));
+      ->check(CLI::Range(0.0, 600.0));
   run.add_option("--camera-delay-ms", cart.camera_delay_ms,
                  "from exposure to arrival, of frames that then bear no stamp (default: stamped)")
-      ->check(hw_sim::number_within(0.0, 1000.0));
+      ->check(CLI::Range(0.0, 1000.0));
   run.add_option("--faults", cart.faults,
                  "script of faults of either instrument, and of what befalls the operation (TOML)");
   const std::map<std::string, hw_sim::ReferenceOn> fixed_on{{"patient", hw_sim::ReferenceOn::patient},
@@ -85,16 +89,16 @@ int main(int argc, char** argv) {
       ->type_name("ON");
   run.add_option("--size", size, "WIDTHxHEIGHT of the video");
   run.add_option("--dwell-s", cart.pace.dwell_s, "how long the scope is held still at each station over the board")
-      ->check(hw_sim::number_within(0.1, 20.0));
+      ->check(CLI::Range(0.1, 20.0));
   run.add_option("--pause-s", cart.pace.pause_s,
                  "how long it then stays there, before the pointer touches the fiducials")
-      ->check(hw_sim::number_within(0.0, 600.0));
+      ->check(CLI::Range(0.0, 600.0));
   run.add_flag("--drop-late", cart.drop_late, "leave out frames that are not traced in time, as a camera would");
   run.add_flag("--strokes", cart.pace.strokes, "after the fiducials, stroke the liver's face with the pointer");
   run.add_flag("--views", cart.pace.views, "hold the scope still at places about the liver, to keep views from");
   run.add_option("--look-s", cart.pace.look_s, "how long the scope then sweeps over the liver (default 7)")
-      ->check(hw_sim::number_within(1.0, 86400.0));
-  run.add_option("--rate", cart.rate_hz, "frames a second")->check(hw_sim::number_within(1.0, 120.0));
+      ->check(CLI::Range(1.0, 86400.0));
+  run.add_option("--rate", cart.rate_hz, "frames a second")->check(CLI::Range(1.0, 120.0));
   run.callback([&] {
     for (const Result<void>& parsed : {hw_sim::parse_size(size, cart.width_px, cart.height_px),
                                        hw_sim::parse_deformation(cart_deformation, "", cart.deformation)}) {
@@ -103,7 +107,8 @@ int main(int argc, char** argv) {
         return;
       }
     }
-    take(hw_sim::run_cart(cart, note_interrupts()));
+    const auto kept = hw_sim::keep_inputs({cart.folder / "cart.json", cart.folder / "truth/truth.json"}, {cart.faults});
+    take(kept ? hw_sim::run_cart(cart, note_interrupts()) : kept);
   });
 
   hw_sim::add_minibird_command(app, take);
@@ -158,9 +163,13 @@ int main(int argc, char** argv) {
       }
     }
     if (still) registration.deformation.amplitude_mm = 0;
-    take(hw_sim::write_case(registration));
+    const auto kept =
+        hw_sim::keep_inputs({registration.folder / "ct.nii.gz", registration.folder / "segmentation.nii.gz"},
+                            {registration.ct, registration.labels});
+    take(kept ? hw_sim::write_case(registration) : kept);
   });
 
+  refuse_odd_numbers(app);
   return run_program<CLI::ParseError>(
       app, argc, argv, [&] { return code == 0 && broken ? static_cast<int>(ExitCode::verdict_fail) : code; });
 }

@@ -13,7 +13,7 @@
 #include <string>
 
 #include "host/files/write_files.hpp"
-#include "hw-sim/app/number_option.hpp"
+#include "hw-sim/app/kept_inputs.hpp"
 #include "hw-sim/campaign/operation_results.hpp"
 #include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/operation/operation.hpp"
@@ -113,6 +113,7 @@ void print(const OperationOutcome& out, const OperationResult& result) {
 }
 
 Result<void> run(const OperationOptions& options, bool& broken) {
+  if (auto kept = keep_inputs({options.log, options.faults}, {options.script}); !kept) return kept;
   SimulatedOperation operation = options.operation;
   // Without pictures other cores would only wait for work: a third of all processor time.
   const int cores = options.cores > 0 ? options.cores : operation.pictures ? tbb::info::default_concurrency() : 1;
@@ -141,7 +142,7 @@ void add_operation_command(CLI::App& app, const Take& take, bool& broken) {
   CLI::App& command = *app.add_subcommand(
       "operation", "one operation in virtual time, with faults at random: whether anything breaks a law");
   command.add_option("--seed", options->operation.seed, "everything random follows from it");
-  command.add_option("--minutes", options->operation.minutes, "how long it is")->check(number_within(0.5, 600.0));
+  command.add_option("--minutes", options->operation.minutes, "how long it is")->check(CLI::Range(0.5, 600.0));
   command.add_flag("--pictures", options->operation.pictures,
                    "the video shows what the scope sees, and the window watches how it moves");
   command

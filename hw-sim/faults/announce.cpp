@@ -1,13 +1,33 @@
 #include "hw-sim/faults/announce.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <system_error>
 
+#include "drivers/system/part_file.hpp"
+#include "drivers/system/unique_fd.hpp"
+
 namespace birdseye::hw_sim {
+
+namespace {
+
+/// To a pipe or a device, which is not waited for.
+Result<void> write_at_once(const std::filesystem::path& path, const std::string& text) {
+  const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK));
+  if (!fd && errno == ENXIO)
+    return Error{Errc::unreadable, fmt::format("{}: nobody reads this pipe; start its reader first", path.string())};
+  if (fd && ::write(fd.get(), text.data(), text.size()) == static_cast<ssize_t>(text.size())) return {};
+  return Error{Errc::unreadable, fmt::format("{}: cannot be written; does its reader take what comes?", path.string())};
+}
+
+}  // namespace
 
 void announce(const nlohmann::json& event) {
   const std::string line = event.dump() + '\n';
@@ -24,13 +44,19 @@ void announce(const FaultEvent& event) {
 }
 
 Result<void> replace_json(const std::filesystem::path& path, const nlohmann::json& json) {
-  const std::filesystem::path fresh = path.string() + ".new";
-  std::ofstream out(fresh);
-  out << json.dump(2) << '\n';
-  out.close();
+  const std::string text = json.dump(2) + '\n';
   std::error_code error;
-  if (out) std::filesystem::rename(fresh, path, error);
-  if (!out || error) return Error{Errc::unreadable, fmt::format("{}: cannot be written", path.string())};
+  if (std::filesystem::is_other(path, error)) return write_at_once(path, text);
+  const auto part = PartFile::make(path);
+  if (!part) return part.error();
+  std::ofstream out(part->path());
+  out << text;
+  out.close();
+  error.clear();
+  // It is not brought onto the disk: an instrument that runs has no time for that.
+  if (out) std::filesystem::rename(part->path(), path, error);
+  if (!out || error)
+    return Error{Errc::unreadable, fmt::format("{}: cannot be written; is the disk full?", path.string())};
   return {};
 }
 

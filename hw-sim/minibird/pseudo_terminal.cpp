@@ -12,7 +12,24 @@
 
 namespace birdseye::hw_sim {
 
+namespace {
+
+/// Where a link leads; empty of anything else.
+std::filesystem::path target_of(const std::filesystem::path& link) {
+  std::error_code ignored;
+  return std::filesystem::read_symlink(link, ignored);
+}
+
+}  // namespace
+
 Result<PseudoTerminal> PseudoTerminal::open(const std::filesystem::path& link) {
+  std::error_code error;
+  if (std::filesystem::exists(std::filesystem::symlink_status(link, error)) &&
+      target_of(link).parent_path() != "/dev/pts") {
+    return Error{Errc::unreadable,
+                 fmt::format("{}: is in the way, and no link to a pseudo-terminal; remove it, or give another --tty",
+                             link.string())};
+  }
   UniqueFd ours(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK));
   std::array<char, 128> name{};
   if (!ours || ::grantpt(ours.get()) != 0 || ::unlockpt(ours.get()) != 0 ||
@@ -26,18 +43,19 @@ Result<PseudoTerminal> PseudoTerminal::open(const std::filesystem::path& link) {
     ::cfmakeraw(&raw);
     ::tcsetattr(theirs.get(), TCSANOW, &raw);
   }
-  std::error_code error;
+  error.clear();
   if (std::filesystem::is_symlink(link, error)) std::filesystem::remove(link, error);
   std::filesystem::create_symlink(name.data(), link, error);
   if (error || !theirs) {
     return Error{Errc::unreadable,
                  fmt::format("{}: cannot be made a link to {}; give another --tty", link.string(), name.data())};
   }
-  return PseudoTerminal(std::move(ours), std::move(theirs), link);
+  return PseudoTerminal(std::move(ours), std::move(theirs), link, name.data());
 }
 
 PseudoTerminal::~PseudoTerminal() {
-  if (!ours_) return;  // moved from: the link is another's
+  if (!ours_) return;                     // moved from: the link is another's
+  if (target_of(link_) != name_) return;  // somebody else's by now
   std::error_code ignored;
   std::filesystem::remove(link_, ignored);
 }

@@ -15,6 +15,7 @@ namespace birdseye::hw_sim {
 /// that goes away with this object.
 class PseudoTerminal {
  public:
+  /// A link that another left there is replaced. Whatever else is there is refused.
   static Result<PseudoTerminal> open(const std::filesystem::path& link);
   PseudoTerminal(PseudoTerminal&&) noexcept = default;
   PseudoTerminal& operator=(PseudoTerminal&&) = delete;
@@ -28,12 +29,13 @@ class PseudoTerminal {
   [[nodiscard]] int fd() const { return ours_.get(); }
 
  private:
-  PseudoTerminal(UniqueFd ours, UniqueFd theirs, std::filesystem::path link)
-      : ours_(std::move(ours)), theirs_(std::move(theirs)), link_(std::move(link)) {}
+  PseudoTerminal(UniqueFd ours, UniqueFd theirs, std::filesystem::path link, std::filesystem::path name)
+      : ours_(std::move(ours)), theirs_(std::move(theirs)), link_(std::move(link)), name_(std::move(name)) {}
 
   UniqueFd ours_;
   UniqueFd theirs_;  ///< held open so that our end does not hang up between two drivers
   std::filesystem::path link_;
+  std::filesystem::path name_;  ///< where the link leads
 };
 
 }  // namespace birdseye::hw_sim

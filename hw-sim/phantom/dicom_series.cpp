@@ -6,19 +6,47 @@
 #include <itkImageFileWriter.h>
 #include <itkMetaDataObject.h>
 
+#include <charconv>
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <system_error>
 
 #include "hw-sim/phantom/itk_image.hpp"
 
 namespace birdseye::hw_sim {
 
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string name_of_slice(int number) {
+  return fmt::format("{:04}.dcm", number);
+}
+
+/// Files with other names may be anybody's.
+void remove_slices(const fs::path& folder, std::error_code& error) {
+  for (fs::directory_iterator at(folder, error); !error && at != fs::directory_iterator(); at.increment(error)) {
+    const std::string name = at->path().filename().string();
+    int number = 0;
+    const auto [end, fault] = std::from_chars(name.data(), name.data() + name.size(), number);
+    if (fault == std::errc() && name == name_of_slice(number)) fs::remove(at->path(), error);
+    if (error) return;
+  }
+}
+
+}  // namespace
+
 Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid& grid, std::span<const std::int16_t> hu,
                                 std::uint64_t seed, double gantry_tilt_deg) {
   std::error_code error;
-  std::filesystem::remove_all(folder, error);
-  std::filesystem::create_directories(folder, error);
+  fs::create_directories(folder, error);
   if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", folder.string())};
+  remove_slices(folder, error);
+  if (error) {
+    return Error{Errc::unreadable,
+                 fmt::format("{}: the former series cannot be removed; choose another --out", folder.string())};
+  }
   using Slice = itk::Image<std::int16_t, 3>;
   // The root 2.25 is for identifiers made of a number of one's own (ITU-T X.667).
   const std::string study = fmt::format("2.25.7711{}", seed);
@@ -64,7 +92,7 @@ Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid&
       const auto writer = itk::ImageFileWriter<Slice>::New();
       writer->SetInput(slice);
       writer->SetImageIO(io);
-      writer->SetFileName((folder / fmt::format("{:04}.dcm", k + 1)).string());
+      writer->SetFileName((folder / name_of_slice(k + 1)).string());
       writer->Update();
     }
   } catch (const std::exception&) {

@@ -9,9 +9,9 @@
 
 namespace birdseye::hw_sim {
 
-/// Writes hu as a CT series of one file per slice into folder (made, or emptied of a former series), with identifiers
-/// that follow from seed alone. gantry_tilt_deg moves each slice on along y, as a tilted gantry does: such a series
-/// must not be stacked straight.
+/// Writes hu as a CT series of one file per slice into folder (made, or rid of a former series' files), with
+/// identifiers that follow from seed alone. gantry_tilt_deg moves each slice on along y, as a tilted gantry does: such
+/// a series must not be stacked straight.
 Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid& grid, std::span<const std::int16_t> hu,
                                 std::uint64_t seed, double gantry_tilt_deg = 0);
 

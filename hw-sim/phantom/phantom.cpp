@@ -74,9 +74,21 @@ Result<void> write_surfaces(const std::filesystem::path& folder, const Body& bod
   return {};
 }
 
+/// A series that no phantom is of may be a patient's.
+Result<void> check_series(const std::filesystem::path& folder) {
+  const std::filesystem::path series = folder / "ct";
+  std::error_code error;
+  const std::filesystem::directory_iterator first(series, error);
+  if (error || first == std::filesystem::directory_iterator() || read_phantom_truth(folder)) return {};
+  return Error{Errc::bad_value,
+               fmt::format("{}: is not empty, and no truth.json of a phantom is beside it; choose another --out",
+                           series.string())};
+}
+
 }  // namespace
 
 Result<void> write_phantom(const PhantomSettings& settings) {
+  if (auto free = check_series(settings.folder); !free) return free;
   std::error_code error;
   std::filesystem::create_directories(settings.folder, error);
   if (error) {

@@ -18,7 +18,7 @@ struct PhantomSettings {
 };
 
 /// Writes folder/ct (DICOM series), folder/segmentation.nii.gz, folder/surfaces/*.ply and folder/truth.json. The same
-/// settings give the same bytes.
+/// settings give the same bytes. A folder/ct that is not empty is refused, but where a phantom was written before.
 Result<void> write_phantom(const PhantomSettings& settings);
 
 /// What folder/truth.json says, patient LPS mm.

@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 
+#include "drivers/system/number_options.hpp"
 #include "drivers/system/program.hpp"
 #include "hw-sim/app/instruments.hpp"
 
@@ -15,5 +16,6 @@ int main(int argc, char** argv) {
   };
   hw_sim::add_minibird_command(app, take);
   hw_sim::add_camera_command(app, take);
+  refuse_odd_numbers(app);
   return run_program<CLI::ParseError>(app, argc, argv, [&code] { return code; });
 }

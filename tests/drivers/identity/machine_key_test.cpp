@@ -161,6 +161,11 @@ TEST(MachineKey, APipeInItsPlaceIsNotWaitedFor) {
 TEST(MachineKey, NamesAFolderThatCannotBe) {
   const Scratch scratch;
   EXPECT_NE(error_of(scratch.file("file", "") + "/identity").find("/file/identity: "), std::string::npos);
+  for (const std::string& no_folder : {std::string("/dev/null"), scratch.file("other", "")}) {
+    const std::string error = error_of(no_folder);
+    EXPECT_EQ(error.find(no_folder + ": is no folder"), 0U) << error;
+    EXPECT_EQ(error.find("chmod"), std::string::npos) << error;
+  }
 }
 
 /// The environment as a test needs it, and afterwards as it was.

@@ -5,6 +5,10 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <sstream>
+#include <utility>
+#include <vector>
 
 #include "host/files/text_files.hpp"
 #include "hw-sim/phantom/dicom_series.hpp"
@@ -35,6 +39,67 @@ TEST(Commands, TheHostAndTheSimulatorKnowTheSameDeformations) {
   expect_refused("birdseye", "demo --deformation melt", kinds);
   expect_refused("birdseye", "live --simulate --deformation melt", kinds);
   expect_refused("birdseye-sim", "cart --phantom p --socket s --tty t --out o --deformation melt", kinds);
+}
+
+/// What --help of a command lists of the options whose type is called so: the option, and how many numbers it takes.
+struct ListedOption {
+  std::string command, option;
+  int numbers;
+};
+
+std::vector<ListedOption> options_of(const std::string& program, const std::string& command, const std::string& type) {
+  const std::regex option("^  (?:-\\w,)?(--[\\w-]+)\\S* \\S*" + type + "\\b(?:.*? x (\\d))?.*");
+  const std::regex name("^  (\\S+).*");
+  std::vector<ListedOption> out;
+  std::istringstream help(run(program, command + " --help").output);
+  bool commands = false;
+  std::smatch found;
+  for (std::string line; std::getline(help, line);) {
+    if (!line.empty() && line[0] != ' ') commands = line.starts_with("Subcommands:");
+    if (commands && std::regex_match(line, found, name)) {
+      for (ListedOption& one : options_of(program, command + " " + found[1].str(), type)) out.push_back(std::move(one));
+    } else if (!commands && std::regex_match(line, found, option)) {
+      out.push_back({command, found[1], found[2].matched ? std::stoi(found[2]) : 1});
+    }
+  }
+  return out;
+}
+
+TEST(Commands, NoOptionTakesWhatIsNoNumber) {
+  for (const auto& [program, least] : {std::pair("birdseye", 50U), std::pair("birdseye-sim", 40U)}) {
+    const auto options = options_of(program, "", "FLOAT");
+    EXPECT_GT(options.size(), least);
+    for (const ListedOption& one : options) {
+      std::string arguments = one.command + " " + one.option;
+      for (int i = 0; i < one.numbers; ++i) arguments += " nan";
+      expect_refused(program, arguments, {one.option, "nan is no number"});
+    }
+  }
+}
+
+TEST(Commands, NoCountIsBelowZero) {
+  for (const auto& [program, least] : {std::pair("birdseye", 3U), std::pair("birdseye-sim", 5U)}) {
+    const auto options = options_of(program, "", "UINT");
+    EXPECT_GT(options.size(), least);
+    for (const ListedOption& one : options)
+      expect_refused(program, one.command + " " + one.option + " -1", {one.option, "-1"});
+  }
+}
+
+/// An escape sequence in a name would move the terminal's cursor, or hide what stands there.
+TEST(Commands, NamesFromFilesDoNotReachTheTerminalRaw) {
+  const Scratch scratch;
+  nlohmann::json places = nlohmann::json::array();
+  for (const auto& [name, place] : std::vector<std::pair<std::string, std::vector<int>>>{
+           {"a\x1b[2J", {0, 0, 0}}, {"b", {100, 0, 0}}, {"c", {0, 80, 0}}, {"d", {10, 20, 60}}})
+    places.push_back({{"label", name}, {"position", place}});
+  const nlohmann::json list = {{"type", "Fiducial"}, {"coordinateSystem", "LPS"}, {"controlPoints", places}};
+  const std::string points =
+      scratch.file("points.mrk.json", nlohmann::json{{"markups", nlohmann::json::array({list})}}.dump());
+  const auto result = run("birdseye", "register fiducials --ct " + points + " --tracker " + points + " --out " +
+                                          (scratch / "pose.txt").string());
+  EXPECT_NE(result.output.find("fiducial  1 (a [2J)"), std::string::npos) << result.output;
+  EXPECT_EQ(result.output.find('\x1b'), std::string::npos) << result.output;
 }
 
 TEST(Commands, VolumeInfoWritesItsFigures) {
@@ -184,7 +249,8 @@ TEST(Commands, WritesAllItsFilesOrNone) {
                              scratch.file("touched.txt", "7 0 1\n107 0 1\n7 80 1\n17 20 61\n") + " --out ";
   expect_refused("birdseye", common + (scratch / "m.txt").string() + " --json /nonexistent/r.json",
                  {"/nonexistent/r.json", "permissions"}, scratch / "m.txt");
-  EXPECT_FALSE(fs::exists(scratch / "m.txt.part"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), fs::directory_iterator()), 2)
+      << "half of one is left";
   expect_refused("birdseye", common + scratch.path().string(), {scratch.path().string(), "is a folder"});
   // A pipe or a device takes the text and stays what it is.
   EXPECT_EQ(run("birdseye", common + "/dev/null --json " + (scratch / "r.json").string()).code, 0);
@@ -259,6 +325,45 @@ TEST(Commands, BirdseyedProbesItsInstrumentsAndNamesEachThatItCannotUse) {
   EXPECT_EQ(result.code, 2);
   for (const char* expected : {"/nonexistent", "[camera] source", "/dev/null"})
     EXPECT_NE(result.output.find(expected), std::string::npos) << result.output;
+}
+
+TEST(Commands, DemoLeavesFilesOfTheUsersOwn) {
+  const Scratch scratch;
+  const std::string out = scratch.path().string();
+  for (const char* name : {"overlay.png", "ct.nii.gz"}) {
+    const std::string own = scratch.file(name, "the user's own");
+    expect_refused("birdseye", "demo --out " + out, {name, "not of an earlier demo", "give another --out"});
+    expect_refused("birdseye", "demo --ct " + own + " --out " + out, {name, "is read", "give another --out"});
+    EXPECT_EQ(testing::contents_of(own), "the user's own");
+    fs::remove(own);
+  }
+  EXPECT_TRUE(fs::is_empty(scratch.path()));
+}
+
+TEST(Commands, WhatIsReadIsNotWrittenOver) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "in");
+  const std::string file = scratch.file("in/one.json", "{}"), folder = (scratch / "in").string();
+  const std::string other = (scratch / "in/../in/one.json").string(), here = (scratch / "./in/new.json").string();
+  const std::vector<std::string> over{"would be written over"}, twice{"is written by", "too"};
+  expect_refused("birdseye", "render --volume ct --pose " + file + " --movie " + other, over);
+  expect_refused("birdseye", "live --language " + file + " --list-texts " + other, over);
+  expect_refused("birdseye", "calibrate tip --poses " + folder + " --out " + file, over);
+  expect_refused("birdseye", "calibrate camera --board chessboard:14x10:3mm --images " + folder + " --out " + file,
+                 over);
+  expect_refused("birdseye", "volume markers " + folder + " --near 1,2,3 --out " + file, over);
+  expect_refused("birdseye", "volume info " + folder + " --json " + file, over);
+  expect_refused("birdseye", "doctor --ct " + folder + " --json " + file, over);
+  expect_refused("birdseye",
+                 "calibrate field check --plate p --measured m --history " + here + " --json " + folder + "/new.json",
+                 twice);
+  EXPECT_EQ(testing::contents_of(file), "{}");
+  EXPECT_FALSE(fs::exists(here));
+  // A new file may go where its inputs lie, and two texts into one device.
+  const std::string points = scratch.file("in/points.txt", kFour);
+  const std::string good =
+      "register fiducials --ct " + points + " --tracker " + scratch.file("t.txt", "7 0 1\n107 0 1\n7 80 1\n17 20 61\n");
+  EXPECT_EQ(run("birdseye", good + " --out " + here + " --json /dev/null --report /dev/null").code, 0);
 }
 
 TEST(Commands, DemoRefusesACtThatIsNotThere) {

@@ -113,5 +113,34 @@ TEST(ExportCommand, WhatCannotBeExportedIsRefused) {
   expect_refused("birdseye", "export --registration " + fiducials + " --out " + scratch.file("file", ""), {"file"});
 }
 
+TEST(ExportCommand, ReplacesAnEarlierExportAndNothingElse) {
+  const Scratch scratch;
+  const std::string fiducials = scratch.file("f.txt", kPatientFromTracker), ct = small_ct(scratch);
+  const fs::path out = scratch / "out";
+  const std::string command = "export --registration " + fiducials + " --out " + out.string();
+  ASSERT_EQ(run("birdseye", command + " --volume " + ct).code, 0);
+  const std::string mine = (out / "deformation.nrrd").string();
+  std::ofstream(mine) << "the user's own";
+  expect_refused("birdseye", command, {mine, "not of an earlier export", "give another --out"});
+  EXPECT_EQ(testing::contents_of(mine), "the user's own");
+  EXPECT_TRUE(fs::exists(out / "ct.nrrd"));
+  fs::remove(mine);
+  const auto again = run("birdseye", command);
+  EXPECT_EQ(again.code, 0) << again.output;
+  EXPECT_NE(again.output.find("replaced an earlier export"), std::string::npos) << again.output;
+  EXPECT_FALSE(fs::exists(out / "ct.nrrd")) << "this export writes none";
+}
+
+TEST(ExportCommand, TheCtThatIsReadIsNotReplaced) {
+  const Scratch scratch;
+  const std::string fiducials = scratch.file("f.txt", kPatientFromTracker);
+  const fs::path out = scratch / "out";
+  const std::string command = "export --registration " + fiducials + " --out " + out.string() + " --volume ";
+  ASSERT_EQ(run("birdseye", command + small_ct(scratch)).code, 0);
+  const std::string before = testing::contents_of(out / "ct.nrrd");
+  expect_refused("birdseye", command + (out / "ct.nrrd").string(), {"ct.nrrd", "is read", "give another --out"});
+  EXPECT_EQ(testing::contents_of(out / "ct.nrrd"), before);
+}
+
 }  // namespace
 }  // namespace birdseye

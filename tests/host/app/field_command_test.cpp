@@ -373,6 +373,17 @@ TEST(FieldCheckCommand, InputThatCannotBeUsedIsRefusedAndNoDayIsAdded) {
   expect_refused("birdseye", common + scratch.file("b.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\n"), {"2 places"},
                  history);
   expect_refused("birdseye", common + scratch.file("c.csv", "name,x,y,z\nd1,0,zero,0\n"), {"c.csv:2"}, history);
+  const std::string whole = "name,x,y,z\nd1,0,0,0\nd2,80,0,0\nd3,0,80,0\nd4,80,80,0\n";
+  expect_refused("birdseye",
+                 common + scratch.file("twice.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\nd3,0,80,0\nd1,80,80,0\n"),
+                 {"twice.csv: has \"d1\" twice"}, history);
+  expect_refused("birdseye",
+                 "calibrate field check --plate " + scratch.file("plate2.csv", whole + "d2,1,0,0\n") + " --history " +
+                     history.string() + " --measured " + scratch.file("w.csv", whole),
+                 {"plate2.csv: has \"d2\" twice"}, history);
+  expect_refused("birdseye",
+                 common + scratch.file("w.csv", whole) + " --json " + (scratch / "no_folder/r.json").string(),
+                 {"r.json"}, history);
   std::ofstream(history) << "when,rms_mm,scale_percent,worst_mm,worst_place\nfirst-day,0.1,0,0.1,d1\n";
   expect_refused("birdseye",
                  common + scratch.file("t.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\nd3,0,80,0\nd4,80,80,0\n") +

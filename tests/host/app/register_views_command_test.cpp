@@ -173,6 +173,8 @@ TEST(RegisterViewsCommand, FailsWhereNoViewSeesTheOrgan) {
   fs::create_directories(scratch / "out");
   for (const char* name : {"field.mha", "report.html", "view0_after.png", "viewpoint_after.png"})
     std::ofstream(scratch / "out" / name) << "an earlier one's";
+  std::ofstream(scratch / "out/result.json")
+      << R"({"verdict": "pass", "files": ["field.mha", "report.html", "view0_after.png"]})";
   const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
   EXPECT_EQ(result.code, 3) << result.output;
   EXPECT_EQ(read_json(scratch / "r.json")["verdict"], "fail");
@@ -180,6 +182,18 @@ TEST(RegisterViewsCommand, FailsWhereNoViewSeesTheOrgan) {
     EXPECT_FALSE(fs::exists(scratch / "out" / name)) << name;
   EXPECT_TRUE(fs::exists(scratch / "out/result.json"));
   EXPECT_TRUE(fs::exists(scratch / "out/viewpoint_after.png")) << "is somebody's own";
+}
+
+TEST(RegisterViewsCommand, FilesOfTheUsersOwnAreNotRemoved) {
+  const Scratch scratch;
+  const std::string command =
+      "register views --case " + scratch.file("case.toml", "") + " --out " + scratch.path().string();
+  for (const char* name : {"view0_before.png", "pose.txt"}) {
+    const std::string own = scratch.file(name, "the user's own");
+    expect_refused("birdseye", command, {name, "not of an earlier register views", "give another --out"});
+    EXPECT_EQ(contents_of(own), "the user's own");
+    fs::remove(own);
+  }
 }
 
 /// What a registration says of an organ that lies as in its CT. from and to: what of the case is changed, as changed()

@@ -124,6 +124,26 @@ TEST(ReplayCommand, TwoReplaysAreTheSameToTheBit) {
   EXPECT_GT(a.at("overlay-000007.png").size(), 2 * a.at("overlay-000023.png").size());
 }
 
+TEST(ReplayCommand, PicturesOfAnEarlierReplayAreRemovedAndNothingElse) {
+  const Scratch scratch;
+  record(scratch / "r");
+  const fs::path out = scratch / "o";
+  const std::string command = inputs(scratch, small_ct(scratch)) + " --registration " +
+                              scratch.file("reg.txt", kIdentityPose) + " --out " + out.string();
+  ASSERT_EQ(run("birdseye", command + " --every 4").code, 0);
+  ASSERT_TRUE(fs::exists(out / "overlay-000011.png"));
+  std::ofstream(out / "notes.txt") << "the user's own";
+  const auto again = run("birdseye", command + " --every 23");
+  ASSERT_EQ(again.code, 0) << again.output;
+  EXPECT_FALSE(fs::exists(out / "overlay-000011.png"));
+  const auto now = contents(out);
+  EXPECT_EQ(now.size(), 2U + 3U + 1U);  // pictures; frames.csv, replay.json, patient_from_tracker.txt; notes.txt
+  EXPECT_EQ(now.at("notes.txt"), "the user's own");
+  std::ofstream(out / "overlay-000003.png") << "the user's own";
+  expect_refused("birdseye", command, {"overlay-000003.png", "not of an earlier replay", "give another --out"});
+  EXPECT_EQ(contents_of(out / "overlay-000003.png"), "the user's own");
+}
+
 TEST(ReplayCommand, SaysWhatTheLiveWindowDecidedThen) {
   const Scratch scratch;
   record(scratch / "r");
@@ -190,6 +210,50 @@ TEST(ReplayCommand, WhatCannotBeReplayedIsRefused) {
   refused("replay " + ct + " --volume " + ct + registration, {"holds no recording"});
   refused(all + " --fiducials " + scratch.file("f.txt", "0 0 0\n1 0 0\n0 1 0\n"), {"--tip"});
   refused(all + registration + " --deformation " + (scratch / "none.mha").string(), {"none.mha"});
+}
+
+TEST(ReplayCommand, AnErrorThatCannotBeStatesNothing) {
+  const Scratch scratch;
+  record(scratch / "r");
+  const std::string all = inputs(scratch, small_ct(scratch)) + " --registration " +
+                          scratch.file("reg.txt", kIdentityPose) + " --out " + (scratch / "o").string();
+  for (const std::string option : {"--camera-rms-px", "--hand-eye-rms-px", "--fre-mm"}) {
+    for (const std::string figure : {"-5", "nan", "inf", "1e300"})
+      expect_refused("birdseye", all + " " + option + " " + figure, {option}, scratch / "o");
+  }
+  for (const std::string option : {"--camera-rms-px", "--hand-eye-rms-px"})
+    expect_refused("birdseye", all + " " + option + " 0", {option + " 0: ", "above 0"}, scratch / "o");
+  EXPECT_NE(run("birdseye", all + " --camera-rms-px 0.3 --hand-eye-rms-px 2 --fre-mm 0").code, 2);
+}
+
+/// Whoever replays by what was written says of it what was said of the first one.
+TEST(ReplayCommand, WhatIsWrittenSaysNoMoreThanWhatWasGiven) {
+  const Scratch scratch;
+  record(scratch / "r");
+  const std::string ct = small_ct(scratch), all = inputs(scratch, ct);
+  const std::string caution = "does not say of which CT it is";
+  const auto replayed = [&](const std::string& registration, const std::string& out) {
+    const auto result =
+        run("birdseye", all + " --registration " + registration + " --fre-mm 1 --out " + (scratch / out).string());
+    EXPECT_NE(result.code, 2) << result.output;
+    return result.output;
+  };
+  EXPECT_NE(replayed(scratch.file("reg.txt", kIdentityPose), "a").find(caution), std::string::npos);
+  const std::string written = (scratch / "a/patient_from_tracker.txt").string();
+  const auto of_nobody = host::read_registration(written);
+  ASSERT_TRUE(of_nobody) << of_nobody.error().what;
+  EXPECT_EQ(of_nobody->ct_sha256, "");
+  EXPECT_FALSE(of_nobody->fre_mm);
+  EXPECT_NE(replayed(written, "b").find(caution), std::string::npos);
+
+  host::RegistrationFile found = *of_nobody;
+  found.ct_sha256 = host::ct_sha256(*host::import_volume(ct));
+  found.fre_mm = 0.5;
+  EXPECT_EQ(replayed(scratch.file("found.txt", host::registration_text(found)), "c").find(caution), std::string::npos);
+  const auto kept = host::read_registration(scratch / "c/patient_from_tracker.txt");
+  ASSERT_TRUE(kept) << kept.error().what;
+  EXPECT_EQ(kept->ct_sha256, found.ct_sha256);
+  EXPECT_EQ(kept->fre_mm, found.fre_mm);
 }
 
 const calibration::Identity kBird{{"unit_serial", "4711"}}, kOtherBird{{"unit_serial", "4712"}};

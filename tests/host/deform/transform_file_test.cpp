@@ -101,6 +101,25 @@ TEST(TransformFile, WhatCannotBeReadOrWrittenIsNamed) {
   EXPECT_FALSE(transform_by_file(scratch / "none.h5", {}));
 }
 
+TEST(TransformFile, WhatLiesBesideItStays) {
+  const Scratch scratch;
+  (void)scratch.file("victim", "a user's");
+  fs::create_directory(scratch / "dir.tfm");
+  for (const char* name : {"map.tfm", "map.h5"}) {
+    const std::string former = std::string("part-") + name;
+    fs::create_symlink("victim", scratch / former);
+    const auto written = write_transform(scratch / name, {});
+    ASSERT_TRUE(written) << written.error().what;
+    EXPECT_FALSE(fs::is_symlink(scratch / name)) << name;
+    EXPECT_TRUE(fs::is_symlink(scratch / former)) << name;
+  }
+  EXPECT_EQ(testing::contents_of(scratch / "victim"), "a user's");
+  const auto refused = write_transform(scratch / "dir.tfm", {});
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().what.find("dir.tfm: is a folder"), std::string::npos) << refused.error().what;
+  EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), {}), 6) << "nothing is left of it";
+}
+
 TEST(DeformedVolume, HoldsAtAPlaceWhatTheCtHasWhereItCameFrom) {
   Volume ct;
   ct.size = {40, 36, 30};

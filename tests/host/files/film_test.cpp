@@ -116,5 +116,35 @@ TEST(Film, WhereThereIsNoFfmpegThatIsSaid) {
   EXPECT_NE(frame.error().what.find("ffmpeg: cannot be started"), std::string::npos) << frame.error().what;
 }
 
+TEST(Film, NothingIsLeftOfOneThatIsNotFinished) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "out");
+  const fs::path path = scratch / "out/film.mp4";
+  {
+    auto film = Film::open(path, 64, 48, 25);
+    ASSERT_TRUE(film) << film.error().what;
+    EXPECT_TRUE(film->add(flat(64, 48, 1)));
+  }
+  EXPECT_TRUE(fs::is_empty(scratch / "out"));
+
+  // An encoder that takes all and then fails.
+  fs::create_directory(scratch / "programs");
+  const fs::path program = scratch.file("programs/ffmpeg", "#!/bin/sh\necho no room left >&2\nwc -c >&2\nexit 1\n");
+  fs::permissions(program, fs::perms::owner_all);
+  const std::string before = ::getenv("PATH");
+  ::setenv("PATH", ((scratch / "programs").string() + ":" + before).c_str(), 1);
+  {
+    auto film = Film::open(path, 64, 48, 25);
+    ::setenv("PATH", before.c_str(), 1);
+    ASSERT_TRUE(film) << film.error().what;
+    EXPECT_TRUE(film->add(flat(64, 48, 1)));
+    const auto finished = film->finish();
+    ASSERT_FALSE(finished);
+    EXPECT_NE(finished.error().what.find(path.string()), std::string::npos) << finished.error().what;
+    EXPECT_NE(finished.error().what.find("no room left"), std::string::npos) << finished.error().what;
+  }
+  EXPECT_TRUE(fs::is_empty(scratch / "out"));
+}
+
 }  // namespace
 }  // namespace birdseye::host

@@ -71,6 +71,19 @@ TEST(RegistrationFile, ACutOneIsRefusedWhereverItWasCut) {
     EXPECT_FALSE(read_registration(scratch.file("pose.txt", text.substr(0, length)))) << "cut after " << length;
 }
 
+TEST(RegistrationFile, AnErrorThatNoMeasurementGivesIsRefused) {
+  const Scratch scratch;
+  RegistrationFile registration = example();
+  for (const double fre_mm : {-5.0, 1e30}) {
+    registration.fre_mm = fre_mm;
+    const auto read = read_registration(scratch.file("pose.txt", registration_text(registration)));
+    ASSERT_FALSE(read) << fre_mm;
+    EXPECT_NE(read.error().what.find("pose.txt: its fre_mm is"), std::string::npos) << read.error().what;
+  }
+  registration.fre_mm = 0;
+  EXPECT_TRUE(read_registration(scratch.file("pose.txt", registration_text(registration))));
+}
+
 TEST(RegistrationFile, OfAnotherCtIsRefusedWithTheRemedy) {
   EXPECT_TRUE(check_ct(example(), std::string(64, 'a')));
   const auto other = check_ct(example(), std::string(64, 'b'));

@@ -1,13 +1,18 @@
 #include "host/files/write_files.hpp"
 
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "calibration/record/sha256.hpp"
+#include "drivers/system/unique_fd.hpp"
 #include "host/files/files_sha256.hpp"
+#include "host/files/result_folder.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/synced_files.hpp"
 
@@ -21,15 +26,68 @@ TEST(WriteFiles, NamesInOtherEncodingsLoseNoFigures) {
   EXPECT_EQ(back["rejected"].get<std::string>().substr(0, 13), "line 82: \"ung");
 }
 
-/// What a power cut leaves while a file is written: the former file, and the new one's beginning beside it.
-TEST(WriteFiles, WhatAnInterruptedWriteLeftIsWrittenOver) {
+std::size_t files_in(const birdseye::testing::Scratch& scratch) {
+  std::size_t count = 0;
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(scratch.path())) ++count;
+  return count;
+}
+
+/// What lies beside it, as what a power cut left of another write, is nobody's to remove.
+TEST(WriteFiles, AFileOfTheUsersOwnNamedPartIsLeftAlone) {
   const birdseye::testing::Scratch scratch;
   const std::string path = scratch.file("result.json", "former");
-  const std::string part = scratch.file("result.json.part", "beginning of a long text");
-  EXPECT_EQ(birdseye::testing::contents_of(path), "former");
+  const std::string part = scratch.file("result.json.part", "the user's own");
   ASSERT_TRUE(write_file(path, "new"));
   EXPECT_EQ(birdseye::testing::contents_of(path), "new");
-  EXPECT_FALSE(std::filesystem::exists(part));
+  EXPECT_EQ(birdseye::testing::contents_of(part), "the user's own");
+  EXPECT_EQ(files_in(scratch), 2U);
+}
+
+TEST(WriteFiles, TwoThatAreTheSameFileAreRefusedBeforeAnythingIsWritten) {
+  const birdseye::testing::Scratch scratch;
+  const std::filesystem::path folder = scratch.path();
+  std::filesystem::create_directory(folder / "b");
+  const auto refused = [](const std::filesystem::path& one, const std::filesystem::path& other) {
+    const auto written = write_files({{one, "text"}, {other, "figures"}});
+    return !written && written.error().what.find("is named twice") != std::string::npos;
+  };
+  EXPECT_TRUE(refused(folder / "a.txt", folder / "./a.txt"));
+  EXPECT_TRUE(refused(folder / "a.txt", folder / "b/../a.txt"));
+  std::filesystem::create_directory_symlink(folder, folder / "also");
+  EXPECT_TRUE(refused(folder / "a.txt", folder / "also/a.txt"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.txt"));
+  (void)scratch.file("a.txt", "former");
+  std::filesystem::create_symlink("a.txt", folder / "link.txt");
+  EXPECT_TRUE(refused(folder / "a.txt", folder / "link.txt"));
+  EXPECT_EQ(birdseye::testing::contents_of(folder / "a.txt"), "former");
+  EXPECT_TRUE(write_files({{folder / "a.txt", "a"}, {folder / "b/a.txt", "b"}}));
+  EXPECT_TRUE(write_files({{"/dev/null", "a"}, {"/dev/null", "b"}}));
+}
+
+TEST(WriteFiles, AFileKeepsItsMode) {
+  const birdseye::testing::Scratch scratch;
+  const std::string path = scratch.file("key.txt", "former");
+  for (const auto mode : {std::filesystem::perms(0600), std::filesystem::perms(0664)}) {
+    std::filesystem::permissions(path, mode);
+    ASSERT_TRUE(write_file(path, "new"));
+    EXPECT_EQ(std::filesystem::status(path).permissions(), mode);
+  }
+}
+
+/// The descriptor stands for standard output that goes into a file, into which the program prints, too.
+TEST(WriteFiles, ALinkToADescriptorStaysAndIsWrittenTo) {
+  const birdseye::testing::Scratch scratch;
+  const std::string into = scratch / "printed.txt";
+  const UniqueFd fd(::open(into.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600));
+  ASSERT_TRUE(fd);
+  ASSERT_EQ(::write(fd.get(), "printed\n", 8), 8);
+  const std::filesystem::path link = scratch / "out.txt";
+  std::filesystem::create_symlink(fmt::format("/proc/self/fd/{}", fd.get()), link);
+  ASSERT_TRUE(write_file(link, "written\n"));
+  ASSERT_EQ(::write(fd.get(), "printed\n", 8), 8);
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(birdseye::testing::contents_of(into), "printed\nwritten\nprinted\n");
+  EXPECT_EQ(files_in(scratch), 2U);
 }
 
 TEST(WriteFiles, IsOnTheDiskByItsName) {
@@ -46,7 +104,49 @@ TEST(WriteFiles, WhereOneCannotBeWrittenNoneIsReplaced) {
   const std::string path = scratch.file("a.txt", "former");
   EXPECT_FALSE(write_files({{path, "new"}, {scratch / "no folder" / "b.txt", "new"}}));
   EXPECT_EQ(birdseye::testing::contents_of(path), "former");
-  EXPECT_FALSE(std::filesystem::exists(path + ".part"));
+  EXPECT_EQ(files_in(scratch), 1U);
+}
+
+const std::vector<std::filesystem::path> kNoInputs;
+
+/// A command's that writes a.txt and p1.png, p2.png and so on.
+ResultFolder folder_in(const birdseye::testing::Scratch& scratch) {
+  return {scratch.path(), "export", "export.json", "a\\.txt|p[0-9]+\\.png"};
+}
+
+TEST(ResultFolder, WhatAnEarlierRunListsIsRemovedAndNothingElse) {
+  const birdseye::testing::Scratch scratch;
+  const ResultFolder folder = folder_in(scratch);
+  (void)scratch.file("notes.txt", "the user's own");
+  for (const char* const listed : {R"(["a.txt", "notes.txt"])", R"({"a.txt": "in words"})"}) {
+    (void)scratch.file("a.txt", "an earlier run's");
+    (void)scratch.file("export.json", std::string(R"({"verdict": "pass", "files": )") + listed + "}");
+    EXPECT_TRUE(make_empty(folder, kNoInputs));
+    EXPECT_FALSE(std::filesystem::exists(scratch / "a.txt"));
+    EXPECT_EQ(birdseye::testing::contents_of(scratch / "notes.txt"), "the user's own");
+  }
+  // A run that did not end left what it had written.
+  const std::string begun = scratch.file("p1.png", "");
+  EXPECT_TRUE(make_empty(folder, kNoInputs));
+  EXPECT_FALSE(std::filesystem::exists(begun));
+}
+
+TEST(ResultFolder, WhatNoEarlierRunListsIsRefused) {
+  const birdseye::testing::Scratch scratch;
+  const ResultFolder folder = folder_in(scratch);
+  const std::string own = scratch.file("p1.png", "the user's own");
+  EXPECT_FALSE(make_empty(folder, kNoInputs)) << "there is no sheet";
+  for (const char* const sheet : {"", "[]", R"({"files": ["p1.png"]})", R"({"verdict": "pass"})",
+                                  R"({"verdict": "pass", "files": 1})", R"({"verdict": "pass", "files": ["a.txt"]})"}) {
+    (void)scratch.file("export.json", sheet);
+    EXPECT_FALSE(make_empty(folder, kNoInputs)) << sheet;
+    EXPECT_EQ(birdseye::testing::contents_of(own), "the user's own");
+    EXPECT_EQ(birdseye::testing::contents_of(scratch / "export.json"), sheet);
+  }
+  std::filesystem::remove(own);
+  (void)scratch.file("a.txt", "an earlier run's");
+  EXPECT_TRUE(check_free(folder, kNoInputs));
+  EXPECT_FALSE(check_free(folder, {scratch.path() / "a.txt"})) << "it is read";
 }
 
 TEST(FilesSha256, AFileIsAsTheSheetBesideItSaysOrRefused) {
@@ -85,6 +185,7 @@ TEST(WriteFiles, NothingIsWrittenThroughALinkNorWaitedFor) {
   EXPECT_EQ(birdseye::testing::contents_of(other), "another's");
   EXPECT_EQ(birdseye::testing::contents_of(path), "ours");
   EXPECT_FALSE(std::filesystem::is_symlink(path));
+  std::filesystem::remove(path + ".part");
   ASSERT_EQ(::mkfifo((path + ".part").c_str(), 0600), 0);
   EXPECT_TRUE(write_file(path, "again"));
   EXPECT_EQ(birdseye::testing::contents_of(path), "again");

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <random>
 
@@ -77,6 +78,42 @@ TEST(WriteImage, IsReadBackAsItIs) {
       EXPECT_EQ(read->hu, image.hu) << name;
     }
   }
+}
+
+TEST(WriteImage, WhatLiesBesideItStays) {
+  const testing::Scratch scratch;
+  (void)scratch.file("victim", "a user's");
+  fs::create_symlink("victim", scratch / "part-a.nrrd");
+  (void)scratch.file("part-b.nrrd", "another's");
+  for (const char* name : {"a.nrrd", "b.nrrd"}) {
+    const auto written = write_image(scratch / name, noise(), StoredAs::uint8);
+    ASSERT_TRUE(written) << written.error().what;
+    EXPECT_FALSE(fs::is_symlink(scratch / name)) << name;
+  }
+  EXPECT_EQ(contents_of(scratch / "victim"), "a user's");
+  EXPECT_TRUE(fs::is_symlink(scratch / "part-a.nrrd"));
+  EXPECT_EQ(contents_of(scratch / "part-b.nrrd"), "another's");
+  EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), {}), 5);
+}
+
+TEST(WriteImage, RefusesAFolderAPipeAndANameThatIsOfTwoFiles) {
+  const testing::Scratch scratch;
+  fs::create_directory(scratch / "dir.nrrd");
+  ASSERT_EQ(::mkfifo((scratch / "pipe.nrrd").c_str(), 0600), 0);
+  for (const auto& [name, why] : {std::pair{"dir.nrrd", "is a folder"},
+                                  {"pipe.nrrd", "is a pipe"},
+                                  {"s.mhd", "name it .nii.gz, .nrrd or .mha"},
+                                  {"s.nhdr", "name it .nii.gz, .nrrd or .mha"},
+                                  {"s.hdr", "name it .nii.gz, .nrrd or .mha"},
+                                  {"s.img", "name it .nii.gz, .nrrd or .mha"},
+                                  {"s.img.gz", "name it .nii.gz, .nrrd or .mha"}}) {
+    const auto written = write_image(scratch / name, noise(), StoredAs::uint8);
+    ASSERT_FALSE(written) << name;
+    EXPECT_NE(written.error().what.find(name), std::string::npos) << written.error().what;
+    EXPECT_NE(written.error().what.find(why), std::string::npos) << written.error().what;
+  }
+  EXPECT_TRUE(fs::is_fifo(scratch / "pipe.nrrd"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), {}), 2) << "nothing else is there";
 }
 
 }  // namespace

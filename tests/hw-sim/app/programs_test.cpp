@@ -1,7 +1,10 @@
 // birdseye-sim minibird and camera from the outside.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -14,6 +17,7 @@
 namespace birdseye {
 namespace {
 
+using testing::contents_of;
 using testing::expect_refused;
 using testing::read_json;
 using testing::run;
@@ -76,6 +80,58 @@ TEST(Programs, TruthIsWrittenBeforeReadyIsSaid) {
   EXPECT_EQ(json["period_s"], 2);
   EXPECT_EQ(json["centre_mm"], nlohmann::json({400, 0, 0}));
   EXPECT_GT(json["zero_monotonic_ns"].get<std::int64_t>(), 0);
+}
+
+TEST(Programs, TruthIsWrittenToAPipeAsItIsAndOverNothingElse) {
+  const Scratch scratch;
+  const std::string bird = "minibird --unix " + (scratch / "line").string() + " --seconds 0.05 --truth ";
+  const std::string pipe = (scratch / "pipe").string();
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  expect_refused("birdseye-sim", bird + pipe, {pipe + ": nobody reads this pipe"});
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  ASSERT_GE(reader, 0);
+  // The camera's is written once.
+  const auto piped = run("birdseye-sim", "camera --socket " + (scratch / "frames").string() +
+                                             " --size 128x96 --seconds 0.05 --truth " + pipe);
+  EXPECT_EQ(piped.code, 0) << piped.output;
+  std::array<char, 4096> text{};
+  const ssize_t got = ::read(reader, text.data(), text.size());
+  ::close(reader);
+  ASSERT_GT(got, 0);
+  EXPECT_EQ(nlohmann::json::parse(text.begin(), text.begin() + got)["width_px"], 128);
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+
+  const std::string truth = (scratch / "truth.json").string(), other = scratch.file("truth.json.new", "a user's");
+  ASSERT_EQ(run("birdseye-sim", bird + truth).code, 0);
+  EXPECT_EQ(read_json(truth)["radius_mm"], 200);
+  EXPECT_EQ(contents_of(other), "a user's");
+  const std::filesystem::path folder = scratch / "folder";
+  std::filesystem::create_directory(folder);
+  expect_refused("birdseye-sim", bird + folder.string(), {folder.string() + ": is a folder"}, folder.string() + ".new");
+}
+
+TEST(Programs, NoOutputIsAnInput) {
+  const Scratch scratch;
+  const std::string text = "[[fault]]\nname = \"saturated\"\nat_s = 1\nfor_s = 1\n";
+  const std::string faults = scratch.file("ok.toml", text), link = (scratch / "link.toml").string();
+  std::filesystem::create_symlink("ok.toml", link);
+  const std::string bird = "minibird --tcp 0 --seconds 0.05 --faults " + faults;
+  const std::string camera = "camera --seconds 0.05 --socket " + (scratch / "frames").string() + " --faults " + faults;
+  const std::string operation = "operation --script " + faults;
+  for (const std::string& name : {faults, link}) {
+    for (const std::string& arguments : {bird + " --truth ", camera + " --truth ", camera + " --strobe ",
+                                         operation + " --log ", operation + " --faults "})
+      expect_refused("birdseye-sim", arguments + name, {name + ": is read by this command"});
+  }
+  EXPECT_EQ(contents_of(faults), text);
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+
+  std::filesystem::create_directories(scratch / "ph/ct");
+  const std::string ct = (scratch / "ph/ct").string(), slice = scratch.file("ph/ct/0001.dcm", "a patient's");
+  for (const std::string& input : {ct, slice})
+    expect_refused("birdseye-sim", "phantom --out " + (scratch / "ph").string() + " --ct " + input,
+                   {ct + ": is read by this command"}, scratch / "ph/truth.json");
+  EXPECT_EQ(contents_of(slice), "a patient's");
 }
 
 TEST(Programs, ACameraSaysWhereItIsAndWhatItSent) {

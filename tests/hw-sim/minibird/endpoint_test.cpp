@@ -130,5 +130,33 @@ TEST(Endpoint, SaysWhatCannotBeListenedAt) {
   EXPECT_EQ(open_terminal("/nonexistent/tty").error().code, Errc::unreadable);
 }
 
+TEST(Endpoint, ATerminalTakesThePlaceOfALinkToAnotherAndOfNothingElse) {
+  namespace fs = std::filesystem;
+  const testing::Scratch scratch;
+  (void)scratch.file("file", "a user's");
+  fs::create_symlink("file", scratch / "link");
+  fs::create_symlink("none", scratch / "dangling");
+  fs::create_directory(scratch / "folder");
+  for (const char* name : {"file", "link", "dangling", "folder"}) {
+    const auto refused = open_terminal(scratch / name);
+    ASSERT_FALSE(refused) << name;
+    EXPECT_NE(refused.error().what.find((scratch / name).string() + ": is in the way"), std::string::npos)
+        << refused.error().what;
+  }
+  EXPECT_EQ(testing::contents_of(scratch / "file"), "a user's");
+  EXPECT_EQ(fs::read_symlink(scratch / "link"), "file");
+  EXPECT_EQ(fs::read_symlink(scratch / "dangling"), "none");
+
+  fs::create_symlink("/dev/pts/9999", scratch / "tty");
+  {
+    const auto endpoint = open_terminal(scratch / "tty");
+    ASSERT_TRUE(endpoint) << endpoint.error().what;
+    EXPECT_NE(fs::read_symlink(scratch / "tty"), "/dev/pts/9999");
+    fs::remove(scratch / "tty");
+    fs::create_symlink("file", scratch / "tty");
+  }
+  EXPECT_EQ(fs::read_symlink(scratch / "tty"), "file") << "that one is another's";
+}
+
 }  // namespace
 }  // namespace birdseye::hw_sim

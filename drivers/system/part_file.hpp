@@ -1,0 +1,36 @@
+#pragma once
+
+#include <filesystem>
+#include <utility>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye {
+
+/// A file until it is whole: under the name that it will have, so that who writes it finds the format by the ending,
+/// in a fresh folder beside its place, where nobody else's file is in the way. What is left of it goes away with this.
+class PartFile {
+ public:
+  /// Refuses a place where there is something that is no file, as a folder, a pipe or a device.
+  static Result<PartFile> make(const std::filesystem::path& place);
+  PartFile(PartFile&& other) noexcept
+      : place_(std::move(other.place_)), folder_(std::exchange(other.folder_, std::filesystem::path())) {}
+  PartFile& operator=(PartFile&& other) noexcept;
+  ~PartFile();
+
+  [[nodiscard]] const std::filesystem::path& place() const { return place_; }
+  [[nodiscard]] std::filesystem::path path() const { return folder_ / place_.filename(); }
+  /// For whatever else belongs to it until it is whole.
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  /// Puts what was written into its place: after a power cut there is the former file or the whole new one.
+  Result<void> put_durably();
+
+ private:
+  PartFile(std::filesystem::path place, std::filesystem::path folder)
+      : place_(std::move(place)), folder_(std::move(folder)) {}
+  void remove();
+
+  std::filesystem::path place_, folder_;
+};
+
+}  // namespace birdseye

@@ -1,0 +1,74 @@
+#include "drivers/system/part_file.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <fstream>
+#include <optional>
+
+#include "tests/support/scratch.hpp"
+#include "tests/support/synced_files.hpp"
+
+namespace birdseye {
+namespace {
+
+namespace fs = std::filesystem;
+
+using testing::contents_of;
+using testing::forget_synced;
+using testing::is_synced;
+using testing::Scratch;
+
+std::ptrdiff_t files_in(const fs::path& folder) {
+  return std::distance(fs::directory_iterator(folder), {});
+}
+
+TEST(PartFile, ComesIntoItsPlaceWholeAndOnTheDisk) {
+  const Scratch scratch;
+  const fs::path place = scratch.file("a.nii.gz", "the former");
+  auto part = PartFile::make(place);
+  ASSERT_TRUE(part) << part.error().what;
+  EXPECT_EQ(part->path().filename(), "a.nii.gz");
+  std::ofstream(part->path()) << "the new one";
+  EXPECT_EQ(contents_of(place), "the former");
+  forget_synced();
+  const auto put = part->put_durably();
+  ASSERT_TRUE(put) << put.error().what;
+  EXPECT_TRUE(is_synced(place));
+  EXPECT_TRUE(is_synced(scratch.path()));
+  EXPECT_EQ(contents_of(place), "the new one");
+  EXPECT_EQ(files_in(scratch.path()), 1) << "its folder is gone before it is";
+}
+
+TEST(PartFile, NothingIsLeftOfOneThatDoesNotGetThere) {
+  const Scratch scratch;
+  {
+    auto first = PartFile::make(scratch / "a.mha");
+    auto second = PartFile::make(scratch / "a.mha");
+    ASSERT_TRUE(first && second);
+    EXPECT_NE(first->path(), second->path());
+    for (const PartFile* part : {&*first, &*second}) std::ofstream(part->path()) << "a half";
+    std::optional<PartFile> moved(*std::move(first));
+    *moved = *std::move(second);
+    EXPECT_EQ(contents_of(moved->path()), "a half");
+  }
+  EXPECT_EQ(files_in(scratch.path()), 0);
+}
+
+TEST(PartFile, WhatIsNoFileIsRefusedByItsName) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "dir.mha");
+  ASSERT_EQ(::mkfifo((scratch / "pipe.mha").c_str(), 0600), 0);
+  for (const auto& [name, why] : {std::pair{"dir.mha", "is a folder"},
+                                  {"none/", "is a folder"},
+                                  {"pipe.mha", "is a pipe or a device"},
+                                  {"none/a.mha", "cannot be written; check the folder"}}) {
+    const auto part = PartFile::make(scratch / name);
+    ASSERT_FALSE(part) << name;
+    EXPECT_NE(part.error().what.find((scratch / name).string() + ": " + why), std::string::npos) << part.error().what;
+  }
+  EXPECT_EQ(files_in(scratch.path()), 2);
+}
+
+}  // namespace
+}  // namespace birdseye
