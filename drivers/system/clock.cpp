@@ -33,6 +33,12 @@ Duration wall_minus_monotonic() {
   return {wall_ns - read_ns(CLOCK_MONOTONIC)};
 }
 
+Duration time_asleep() {
+  if (TimeKeeper::present() != nullptr) return {0};  // where time is simulated nobody sleeps
+  const std::int64_t booted_ns = read_ns(CLOCK_BOOTTIME);
+  return {booted_ns - read_ns(CLOCK_MONOTONIC)};
+}
+
 std::string utc_now() {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time_t{read_ns(CLOCK_REALTIME) / 1'000'000'000}));
 }

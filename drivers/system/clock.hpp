@@ -16,6 +16,8 @@ DeviceTime device_now();
 HostTime host_now();
 /// By how much the time of day is ahead of CLOCK_MONOTONIC.
 Duration wall_minus_monotonic();
+/// How long this machine has slept since it was started: CLOCK_MONOTONIC stood still then.
+Duration time_asleep();
 /// The time of day, UTC, as "2026-11-22T22:51:36Z".
 std::string utc_now();
 /// The time of day where this machine is, as "2026-11-22T23:51".

@@ -23,7 +23,8 @@ bool is_other_scope(const CalibratedScope& by_board, const std::string& now) {
 
 }  // namespace
 
-void CalibrationStep::begin(const std::string& bird, const std::optional<calibration::Pattern>& board) {
+void CalibrationStep::begin(const std::string& bird, const std::optional<calibration::Pattern>& board,
+                            const Instruments& with) {
   if (guiding() || !board) return;
   GuidePlan plan;
   plan.bird = bird;
@@ -34,6 +35,8 @@ void CalibrationStep::begin(const std::string& bird, const std::optional<calibra
   }
   verdict_.reset();
   note_ = {false, words("note_over_board")};
+  begun_with_ = with;
+  begun_scope_ = record_scope_;
   guide_.start(std::move(plan));
 }
 
@@ -60,6 +63,7 @@ void CalibrationStep::hold_back(const std::string& why) {
 }
 
 bool CalibrationStep::withdraw_record(const std::string& why) {
+  record_scope_.clear();
   if (!found_ && !held_back_) {
     if (!why.empty()) note_.line = why;
     return false;
@@ -80,17 +84,23 @@ bool CalibrationStep::judge(const ConnectedInstruments& connected) {
   if (!match.holds) hold_back(match.why_not);
   if (match.holds && held_back_) {
     // Told from now on by this connection, whatever nobody told before.
-    held_back_->found_with = connected.now();
+    held_back_->found_with = taken_over(held_back_->found_with, connected.now());
     take(*std::exchange(held_back_, std::nullopt), line_);
   }
   return changes;
 }
 
-bool CalibrationStep::tick(const Instruments& found_with) {
+bool CalibrationStep::tick(const Instruments& now) {
   auto guided = guide_.take();
-  if (!guided || !finish(*guided)) return false;
-  found_->found_with = found_with;
-  found_->record_scope = record_scope_;
+  if (!guided) return false;
+  if (!begun_scope_.empty() && !record_scope_.empty() && begun_scope_ != record_scope_) {
+    note_.line = words("note_board_other_scope");
+    return false;
+  }
+  if (!finish(*guided)) return false;
+  found_->found_with = begun_with_.link == now.link ? taken_over(now, begun_with_) : begun_with_;
+  found_->record_scope = begun_scope_;
+  passed_over_utc_ = record_utc_;
   return true;
 }
 
@@ -114,10 +124,11 @@ CalibrationStep::Adopted CalibrationStep::adopt(const calibration::CalibrationRe
   auto scope = ScopeSetup::of_record(record);
   if (!scope) return Adopted::no;
   record_scope_ = record.scope;
-  const std::string& made_utc = record.hand_eye->provenance.made_utc;
+  const std::string& made_utc = record_utc_ = record.hand_eye->provenance.made_utc;
   const auto& before = rests_on();
-  if (before && before->by_board && made_utc <= before->made_utc && !is_other_scope(*before, record.scope))
-    return Adopted::no;
+  // The clocks of two machines may stand otherwise: what the board was used in place of is older for sure.
+  const bool older = before && (made_utc <= before->made_utc || made_utc == passed_over_utc_);
+  if (older && before->by_board && !is_other_scope(*before, record.scope)) return Adopted::no;
   CalibratedScope adopted{*std::move(scope), made_utc, false, {record.tracker, record.camera}, record.scope};
   const bool anew = before && !is_same(*before, adopted);
   take(std::move(adopted), words("note_record_of", made_utc));
@@ -132,7 +143,7 @@ bool CalibrationStep::take_up(const CalibratedScope& kept, const std::string& li
     return !now || is_same(*now, kept);
   }
   if (found_ && (kept.made_utc <= found_->made_utc || is_other_scope(kept, record_scope_))) return false;
-  if (!kept.scope.figures().held_out_px) {
+  if (!kept.scope.figures().held_out_px || !kept.scope.figures().held_out_mm) {
     // Nothing could be drawn by it.
     if (!found_) note_.line = words("note_kept_unknown");
     return false;

@@ -15,14 +15,15 @@ namespace birdseye::host {
 /// where the appliance had a record as the board was used, and has one of another scope now, that record counts.
 class CalibrationStep {
  public:
-  /// Over the board; nothing without one, or where it has begun. bird: the scope's.
-  void begin(const std::string& bird, const std::optional<calibration::Pattern>& board);
+  /// Over the board; nothing without one, or where it has begun. bird: the scope's. with: what is connected.
+  void begin(const std::string& bird, const std::optional<calibration::Pattern>& board, const Instruments& with);
   /// With the stations so far.
   void end();
   /// What the appliance sends, for the guide.
   void push(const wire::Event& event);
-  /// True: the guide has found a calibration.
-  bool tick(const Instruments& found_with);
+  /// True: the guide has found a calibration, of what was connected as it began: judge() is due. It finds none where
+  /// the appliance has the record of another scope by now. now: what is connected.
+  bool tick(const Instruments& now);
 
   enum class Adopted { no, again, anew };
   /// The appliance's record. again: it is the one that is in force already.
@@ -67,7 +68,11 @@ class CalibrationStep {
 
   std::optional<CalibratedScope> found_, held_back_;
   std::optional<CalibratedScope> former_;  ///< of an earlier window, by a record that has not come yet
-  std::string record_scope_;               ///< the scope of the appliance's last record
+  std::string record_scope_;               ///< the scope of the record that the appliance has; empty: it has none
+  std::string record_utc_;                 ///< when the appliance's last record was made
+  Instruments begun_with_;                 ///< the guide
+  std::string begun_scope_;                ///< record_scope_ then
+  std::string passed_over_utc_;            ///< of the record in whose place the board was used
   std::string line_;                       ///< of what is held back, as it was found
   bool person_may_say_ = false;
   StepNote note_;

@@ -73,14 +73,16 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
   }
   note_ = {false, words("note_matching")};
   dropped_ = false;
+  target_at_rest_mm_ = target_in_patient_mm(*patient);
   if (made_.patient.lock() != patient || made_.transfer.lock() != transfer) made_ = {patient, transfer, nullptr};
-  matching_.start([views = std::move(views), frames = std::move(frames), patient = std::move(patient),
-                   transfer = std::move(transfer), made = made_.organ, touches = std::move(touches),
+  matching_.start([target_mm = *target_at_rest_mm_, views = std::move(views), frames = std::move(frames),
+                   patient = std::move(patient), transfer = std::move(transfer), made = made_.organ,
+                   touches = std::move(touches),
                    camera_covariance](const std::stop_token& stop, const auto& say) -> Result<Matched> {
     std::vector<RgbView> pictures;
     for (const wire::VideoFrame& frame : frames) pictures.push_back({*frame.rgb, frame.width_px, frame.height_px});
     GeometrySettings settings;
-    settings.targets_at_rest_mm = {target_in_patient_mm(*patient)};
+    settings.targets_at_rest_mm = {target_mm};
     settings.touches = touches;
     settings.camera_covariances.assign(views.size(), camera_covariance);
     settings.gather_touches = true;
@@ -136,8 +138,10 @@ bool DeformationStep::tick() {
   if (with_care) organ.care = reason;
   if (const auto& expected = registration.expected) {
     if (expected->seen) organ.seen_rms_mm = expected->seen->rms_mm;
-    if (!expected->targets.empty())
+    if (!expected->targets.empty()) {
       organ.target = MotionError{expected->targets.front().rms_mm, expected->targets.front().radius95_mm};
+      organ.target_at_rest_mm = target_at_rest_mm_;
+    }
   }
   found_ = std::make_shared<const DeformedOrgan>(std::move(organ));
   adjusted_.clear();
@@ -148,6 +152,13 @@ bool DeformationStep::tick() {
 void DeformationStep::undo() {
   found_.reset();
   note_ = {false, words("note_undone")};
+}
+
+void DeformationStep::drop(const std::string& why) {
+  if (!running()) return;
+  dropped_ = true;
+  cancel();
+  note_.line = why;
 }
 
 bool DeformationStep::forget() {

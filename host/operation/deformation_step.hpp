@@ -1,6 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -32,6 +34,8 @@ class DeformationStep {
   /// True: another deformation was found.
   bool tick();
   void undo();
+  /// What is being found, if anything is, is of an organ that lies otherwise by now.
+  void drop(const std::string& why);
   /// What was found, or is being found, is by a setup that is no more. True: there was a deformation.
   bool forget();
   /// An earlier window's.
@@ -69,6 +73,7 @@ class DeformationStep {
   Made made_;
   std::shared_ptr<const DeformedOrgan> found_;
   std::vector<Transform<Camera, Patient>> adjusted_;
+  std::optional<Eigen::Vector3d> target_at_rest_mm_;  ///< that the matching is judged by
   StepNote note_;
   bool dropped_ = false;  ///< what is being found is by a setup that is no more
   Background<Result<Matched>> matching_;

@@ -40,6 +40,7 @@ bool FiducialStep::take_back(std::size_t which) {
 
 void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm, std::size_t wanted,
                        const Volume* ct) {
+  fit_is_due_ = held_back_ && !touches_.empty();
   if (held_back_) return;
   if (touches_.empty()) confirmed_ = true;  // there is nothing in doubt
   registered_.reset();
@@ -67,7 +68,7 @@ void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& marker
   }
   for (std::size_t i = 0; i < touches_.size(); ++i) touches_[i].residual_mm = found->residuals_mm[i];
   registered_->found_with = found_with_;
-  doubt_ = found->doubt;
+  registered_->doubt = doubt_ = found->doubt;
   may_add_ = !doubt_.empty() && touches_.size() < markers_in_patient_mm->size();
   note_.line = words("note_touched_fre", touches_.size(), registered_->fre_mm);
   if (!doubt_.empty()) note_.line = words("note_doubt", note_.line, doubt_);
@@ -82,7 +83,9 @@ bool FiducialStep::take_up(const std::optional<RegisteredPatient>& kept, const s
   found_with_ = kept->found_with;
   confirmed_ = false;
   fits_poorly_ = kept->fre_mm > kGoodFit_mm;
+  doubt_ = kept->doubt;
   note_ = {true, words("note_taken_up_fre", when, kept->fre_mm)};
+  if (!doubt_.empty()) note_.line = words("note_doubt", note_.line, doubt_);
   return true;
 }
 
@@ -109,7 +112,7 @@ bool FiducialStep::judge(const ConnectedInstruments& connected) {
     note_ = {false, match.why_not};
   } else if (held_back_) {
     held_back_ = false;
-    found_with_ = connected.now();
+    found_with_ = taken_over(found_with_, connected.now());
     if (registered_) registered_->found_with = found_with_;
     note_ = {done_, line_};
   }

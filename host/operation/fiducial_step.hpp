@@ -27,6 +27,8 @@ class FiducialStep {
   /// there is none.
   void fit(const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm, std::size_t wanted,
            const Volume* ct);
+  /// What is held back was to be fitted anew, as where a marker was dropped, and is back.
+  [[nodiscard]] bool fit_is_due() const { return fit_is_due_ && !held_back_; }
   /// An earlier window's registration, which counts for nothing before confirm(): patient or transmitter may have been
   /// moved meanwhile. Not where fiducials were touched anew; false then. Touches too few for a fit are dropped.
   bool take_up(const std::optional<RegisteredPatient>& kept, const std::string& when);
@@ -70,6 +72,7 @@ class FiducialStep {
   bool confirmed_ = true, suspected_ = false, held_back_ = false, person_may_say_ = false;
   std::string fault_, line_;                    ///< line_: of what is held back, as it was found
   bool done_ = false;                           ///< and whether the step was done by it
+  bool fit_is_due_ = false;                     ///< of touches that are held back
   bool fits_poorly_ = false, may_add_ = false;  ///< may_add_: one more than wanted, which the fit asks for
   std::string doubt_;                           ///< of a fit, in words; empty: none
   std::optional<std::size_t> odd_;

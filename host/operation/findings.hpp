@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -37,6 +38,8 @@ struct RegisteredPatient {
   std::vector<Eigen::Vector3d> fiducials_in_patient_mm;  ///< those that were touched: three or more
   Instruments found_with{};                              ///< the tracker counts: touches are in its frame
   std::string made_utc{};
+  std::string doubt{};                     ///< what cannot be told by these touches; empty: nothing
+  std::map<std::string, double> off_mm{};  ///< how far places were off as the pointer was last held there, by name
 };
 
 /// How the organ is deformed, and how well that is known; what was not estimated is absent.
@@ -45,7 +48,8 @@ struct DeformedOrgan {
   std::optional<double> seen_rms_mm;  ///< to be expected of the surface that the views see, of three axes together
   std::optional<MotionError> target;
   std::string made_utc{};
-  std::string care{};  ///< why it is to be used with care; empty: it passed
+  std::optional<Eigen::Vector3d> target_at_rest_mm{};  ///< of which target that is, in the CT as it was taken
+  std::string care{};                                  ///< why it is to be used with care; empty: it passed
 };
 
 struct TouchFit {

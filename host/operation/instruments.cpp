@@ -21,6 +21,13 @@ void take_identities(const wire::Health& health, Instruments& told) {
   }
 }
 
+Instruments taken_over(const Instruments& found, const Instruments& now) {
+  Instruments out = now;
+  if (out.tracker.empty()) out.tracker = found.tracker;
+  if (out.camera.empty()) out.camera = found.camera;
+  return out;
+}
+
 void ConnectedInstruments::take(const wire::Health& health) {
   take_identities(health, now_);
 }

@@ -24,6 +24,10 @@ struct PictureHardware {
 /// Enters what the appliance tells of them; of what it does not tell, what was known stays.
 void take_identities(const wire::Health& health, Instruments& told);
 
+/// What was found with `found` holds with what is connected now: it stands for that from now on. What nobody tells now
+/// stays as it was told before, so that it can still turn out to be another.
+Instruments taken_over(const Instruments& found, const Instruments& now);
+
 /// What a finding depends on: hand-eye and lens on both instruments, a registration by touches on the tracker alone,
 /// and on the reference sensor.
 enum class DependsOn : std::uint8_t { tracker, tracker_and_camera };

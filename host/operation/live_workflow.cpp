@@ -17,6 +17,7 @@ LiveWorkflow::LiveWorkflow(LiveSettings settings)
 }
 
 void LiveWorkflow::tick() {
+  note_sleep(time_asleep());
   keeper_.tick();
   const PatientStep::News news = patient_.tick();
   if (news.engine) {
@@ -53,6 +54,7 @@ void LiveWorkflow::tick() {
   if (!calibration_.tick(instruments_.now())) return;
   forget_views(words("note_calibrated_anew"));
   update_setup();
+  judge_instruments();
   keep();
   if (step_ != LiveStep::calibrate) return;
   const bool all_touched = settings_.fiducials != 0 && fiducials_.fits();
@@ -160,7 +162,7 @@ void LiveWorkflow::take_birds(const wire::Birds& birds, HostTime now, const std:
     if (bird.name == settings_.pointer) pointer_was_ = std::min(*was, now);
   const auto registered = fiducials_.registered();
   for (const wire::Bird& bird : birds.birds) {
-    if (bird.name != settings_.pointer || !strokes_.stroking() || !registered) continue;
+    if (bird.name != settings_.pointer || !strokes_.stroking() || !registered || !fiducials_.confirmed()) continue;
     strokes_.take(birds.acquired, registered->tracker_from_patient.inverse() * (bird.tracker_from_sensor * *tip_mm));
   }
   // The hand need not wait for the arithmetic.
@@ -170,6 +172,7 @@ void LiveWorkflow::take_birds(const wire::Birds& birds, HostTime now, const std:
   if (!rested || !touching || may_hear_of_reference() || is_other_patients() ||
       !fiducials_.add(*rested, settings_.fiducials, instruments_.now()))
     return;
+  note_looked_at();
   fit();
   keep();
 }
@@ -183,6 +186,9 @@ bool LiveWorkflow::may_hear_of_reference() const {
 void LiveWorkflow::judge_instruments() {
   const bool scope = calibration_.judge(instruments_), patient = fiducials_.judge(instruments_);
   if (scope || patient) follow_held_back();
+  if (!fiducials_.fit_is_due()) return;
+  fit();
+  keep();
 }
 
 /// The first step of which something is held back is open again; with all of it back the operation goes on where it
@@ -222,8 +228,11 @@ void LiveWorkflow::fit() {
   const auto registered = fiducials_.registered();
   const bool same =
       before && registered && before->tracker_from_patient.matrix() == registered->tracker_from_patient.matrix();
-  if (!same) off_mm_.clear();
-  note_looked_at();
+  if (!same) {
+    off_mm_.clear();
+    refused_by_.clear();
+    fits_at_mm_.reset();
+  }
   asked_to_take_back_.reset();
   if (fiducials_.confirmed()) why_doubted_.clear();
   forget_views(words("note_views_touched_anew"));
@@ -245,6 +254,7 @@ void LiveWorkflow::forget_views(const std::string& why) {
 
 void LiveWorkflow::show_shape() {
   checked_.reset();
+  fits_at_mm_.reset();
   ++shapes_;
   watch_.forget();
   motion_ = {};
@@ -316,7 +326,7 @@ void LiveWorkflow::go_to(LiveStep step) {
   step_ = step;
   // What is held back may come back by itself; by the large button the scope is calibrated anew.
   const bool open = !calibration_.note().done && !calibration_.held_back();
-  if (step == LiveStep::calibrate && open) calibration_.begin(settings_.scope, settings_.pattern);
+  if (step == LiveStep::calibrate && open) calibration_.begin(settings_.scope, settings_.pattern, instruments_.now());
   if (step == LiveStep::run) run_ = {true, words("note_runs")};
 }
 
@@ -350,10 +360,12 @@ void LiveWorkflow::primary(HostTime now) {
     case LiveStep::connect:
       break;
     case LiveStep::calibrate:
-      return calibration_.guiding() ? calibration_.end() : calibration_.begin(settings_.scope, settings_.pattern);
+      return calibration_.guiding() ? calibration_.end()
+                                    : calibration_.begin(settings_.scope, settings_.pattern, instruments_.now());
     case LiveStep::fiducials:
       if (simulated_) break;  // its operator touches them
       if (const auto held = pointer_held(); held && fiducials_.add(*held, settings_.fiducials, instruments_.now())) {
+        note_looked_at();
         fit();
         keep();
       }

@@ -57,8 +57,11 @@ class LiveWorkflow {
   void take(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock);
   /// What a check of the video against the deformed surface has found.
   void take(const CheckedSurface& checked);
-  /// Collects what threads have finished.
+  /// Collects what threads have finished, and looks whether this machine has slept.
   void tick();
+  /// How long this machine has slept since it was started. Where it slept since it was last told, nobody saw what
+  /// moved.
+  void note_sleep(Duration asleep);
   /// The last: waits until what was found is kept, or cannot be, which the view's fault says.
   void finish() { keeper_.finish(); }
   /// The link to the appliance came or went; may_retry as ConnectionStep has it.
@@ -155,6 +158,7 @@ class LiveWorkflow {
   void check_registration();
   void check_undoubted(const std::optional<CheckReading>& reading);
   void check_in_doubt(const CheckReading& reading);
+  void note_off(const CheckReading& reading);
   void refuse_registration(const CheckReading& by);
   void confirm_registration(const std::optional<CheckReading>& by);
   void watch_surface(HostTime now);
@@ -169,6 +173,7 @@ class LiveWorkflow {
   bool simulated_ = false;              ///< nobody lies there
   std::optional<HostTime> video_came_;  ///< the newest frame
   std::optional<HostTime> scope_came_;  ///< the scope's newest pose, or later where the patient was touched since
+  std::optional<Duration> asleep_;      ///< how long this machine has slept, as it was last told
   std::optional<HostTime> watched_;     ///< the newest frame by which it was watched that video and poses agree
   bool guided_ = false;                 ///< the scope was being calibrated over the board then
   ConnectedInstruments instruments_;
@@ -196,7 +201,8 @@ class LiveWorkflow {
   std::optional<HostTime> pointer_was_;        ///< when the newest pose of the pointer was measured, at the earliest
   std::optional<Eigen::Vector3d> fits_at_mm_;  ///< in doubt, the first place at which it fits; patient frame
   std::map<std::string, double>
-      off_mm_;  ///< how far each place was off as the pointer was last held there, by the place's name
+      off_mm_;              ///< how far each place was off as the pointer was last held there, by the place's name
+  std::string refused_by_;  ///< the landmark that was off, and has not been found to fit since; empty: none
   std::size_t landmarks_before_doubt_ = 0;  ///< that were known as the registration came into doubt
   FiducialStep fiducials_;
   std::optional<std::size_t> asked_to_take_back_;

@@ -47,6 +47,14 @@ void LiveWorkflow::note_looked_at() {
   scope_came_ = heard_ + (kToBringScope - kPause);
 }
 
+/// CLOCK_MONOTONIC stands still in a machine that sleeps, and so no pause is seen.
+void LiveWorkflow::note_sleep(Duration asleep) {
+  constexpr Duration kSlept = Duration::from_ms(1000);  // the two clocks are not read at once
+  const bool slept = asleep_ && asleep - *asleep_ > kSlept;
+  if (slept || !asleep_) asleep_ = asleep;
+  if (slept) doubt_registration("");
+}
+
 /// Something begins to speak against the registration: those that are known now may tell whether it holds.
 void LiveWorkflow::note_landmarks() {
   if (fiducials_.confirmed() && !fiducials_.suspected()) landmarks_before_doubt_ = patient_.landmarks().size();
@@ -59,7 +67,7 @@ void LiveWorkflow::doubt_registration(const std::string& why) {
   fiducials_.doubt();
   pointer_ = {};  // where it was before tells nothing of what has moved since
   fits_at_mm_.reset();
-  off_mm_.clear();
+  strokes_.end();
   if (!fiducials_.registered_or_held_back()) return follow_held_back();
   run_ = {};
   checked_.reset();
@@ -107,6 +115,7 @@ void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
 
 void LiveWorkflow::take(const CheckedSurface& checked) {
   if (!deformation_.found() || !motion_.take(checked)) return;
+  deformation_.drop(words("note_views_organ_moved"));
   if (motion_.moved_mm()) {
     views_.forget(words("note_views_organ_moved"));
     strokes_.forget();
@@ -157,22 +166,35 @@ void LiveWorkflow::check_undoubted(const std::optional<CheckReading>& reading) {
   constexpr double kPointedAt_mm = 100;  // further away the pointer is laid aside
   const bool pointed_at = reading && reading->distance_mm <= kPointedAt_mm;
   if (pointed_at && reading->distance_mm > kMostCheckedOff_mm) return refuse_registration(*reading);
-  if (pointed_at) off_mm_[reading->nearest] = reading->distance_mm;
+  if (pointed_at) note_off(*reading);
   if (pointed_at && !reading->fitted) return confirm_registration(*reading);
   if (!checked_) check_.line = words("note_unchecked");
   confirm_registration(std::nullopt);
 }
 
 /// Two places that fit confirm it, or nothing does: what has moved may have another place where the one was. A fitted
-/// place tells as much of that as another, and the farther the pointer is from any the more may have moved.
+/// place tells as much of that as another, and the farther the pointer is from any the more may have moved. But a
+/// landmark that was off tells how good the fit is, of which no place tells that it was made to fit: only that landmark
+/// overrules itself.
 void LiveWorkflow::check_in_doubt(const CheckReading& reading) {
   constexpr double kApart_mm = 30;  // the two places
   if (reading.distance_mm > kMostCheckedOff_mm) return refuse_registration(reading);
-  off_mm_[reading.nearest] = reading.distance_mm;
+  note_off(reading);
+  if (reading.nearest == refused_by_) refused_by_.clear();
+  if (!refused_by_.empty()) {
+    if (!fits_at_mm_) fits_at_mm_ = reading.nearest_mm;
+    check_ = {false, words("note_check_refused", reading.distance_mm, reading.nearest, refused_by_)};
+    return;
+  }
   if (fits_at_mm_ && (*fits_at_mm_ - reading.nearest_mm).norm() >= kApart_mm) return confirm_registration(reading);
   if (!reading.fitted) checked_ = {reading.nearest, reading.distance_mm};
   if (!fits_at_mm_) fits_at_mm_ = reading.nearest_mm;
   check_ = {false, words("note_check_second", reading.distance_mm, reading.nearest)};
+}
+
+void LiveWorkflow::note_off(const CheckReading& reading) {
+  off_mm_[reading.nearest] = reading.distance_mm;
+  keep();
 }
 
 void LiveWorkflow::refuse_registration(const CheckReading& by) {
@@ -180,7 +202,7 @@ void LiveWorkflow::refuse_registration(const CheckReading& by) {
   check_ = {false, why_doubted_};
   checked_.reset();
   fits_at_mm_.reset();
-  off_mm_.clear();
+  if (!by.fitted) refused_by_ = by.nearest;
   note_landmarks();
   fiducials_.doubt();
   update_setup();

@@ -46,6 +46,7 @@ void LiveWorkflow::keep() {
   operation.record_sha256 = record_sha256_;
   operation.calibrated = calibration_.rests_on();
   operation.registered = fiducials_.registered_or_held_back();
+  if (operation.registered) operation.registered->off_mm = off_mm_;
   operation.deformed = deformation_.found();
   // What the next window finds in it rests on the same.
   for (const std::string* doubt : {&record_doubt_, &operation_doubt_, &settings_.recording_doubt, &field_doubt_}) {
@@ -55,7 +56,8 @@ void LiveWorkflow::keep() {
 }
 
 void LiveWorkflow::take_up() {
-  const auto operation = keeper_.take_up(patient_.plan()->ct_sha256, patient_.plan()->labels_sha256);
+  const auto operation = keeper_.take_up(patient_.plan()->ct_sha256, patient_.plan()->labels_sha256,
+                                         target_in_patient_mm(*patient_.plan()));
   if (!operation) {
     resume_fault_ = operation.error().what;
     return;
@@ -68,11 +70,15 @@ void LiveWorkflow::take_up() {
   if (record_sha256_.empty()) record_sha256_ = kept->record_sha256;
   // The calibration that is in force may be newer, or nobody knows which one it was: a deformation then means nothing.
   const bool same_scope = kept->calibrated && calibration_.take_up(*kept->calibrated, when);
-  if (fiducials_.take_up(kept->registered, when) && kept->deformed && same_scope) {
+  const bool taken_up = fiducials_.take_up(kept->registered, when);
+  if (taken_up && kept->registered) off_mm_ = kept->registered->off_mm;
+  // The circle would be too small by what is not known.
+  const bool is_known = kept->deformed && kept->deformed->target;
+  if (taken_up && same_scope && is_known) {
     deformation_.take_up(kept->deformed, when);
     show_shape();
   } else if (kept->deformed) {
-    views_.forget(words("note_calibrated_anew"));
+    views_.forget(is_known ? words("note_calibrated_anew") : words("note_deformed_unknown"));
   }
   judge_instruments();
   update_setup();

@@ -6,6 +6,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/durable.hpp"
 #include "drivers/system/json_file.hpp"
 #include "drivers/system/whole_file.hpp"
 #include "host/files/camera_files.hpp"
@@ -29,6 +30,8 @@ constexpr const char* kRegistration = "patient_from_tracker.txt";
 constexpr const char* kField = "field.mha";
 
 constexpr int kVersion = 2;  // 0.1.0 wrote none
+
+constexpr std::size_t kMostSheet_bytes = 16U << 20U;  // a hundred times what one has
 
 /// Its lens, and how well that is known, where anything says so.
 std::string camera_file(const ScopeSetup& scope) {
@@ -65,27 +68,64 @@ std::string sheet_text(const Operation& operation, const ThisMachine& machine) {
   return sealed_text(parts, kOperationFormat, machine);
 }
 
-/// For other programs. A copy of what is no more in the operation is taken away: it would be taken for the present.
+/// A file for other programs, of a part of the operation.
+struct Copy {
+  const char* name;
+  const char* part;
+  bool written;  ///< the operation has the part
+};
+
+std::array<Copy, 4> copies_of(const Operation& operation) {
+  return {{{kCamera, "calibrated", operation.calibrated.has_value()},
+           {kHandEye, "calibrated", operation.calibrated.has_value()},
+           {kRegistration, "registered", operation.registered.has_value()},
+           {kField, "deformed", operation.deformed != nullptr}}};
+}
+
+/// The operation that the folder holds so far; empty where it holds none that can be read.
+nlohmann::json former_sheet(const fs::path& folder) {
+  const auto text = read_whole_file(folder / kSheet, kMostSheet_bytes);
+  if (!text) return nlohmann::json::object();
+  auto sheet = unseal(*text);
+  return sheet ? *std::move(sheet) : nlohmann::json::object();
+}
+
+/// A file by a copy's name that the former operation did not write is somebody's own.
+Result<void> check_copies(const fs::path& folder, const Operation& operation, const nlohmann::json& former) {
+  for (const Copy& copy : copies_of(operation)) {
+    std::error_code ignored;
+    if (!copy.written || former.contains(copy.part)) continue;
+    if (!fs::exists(fs::symlink_status(folder / copy.name, ignored))) continue;
+    return Error{Errc::bad_value, fmt::format("{}: is there, and not of this operation; move it away, or give another "
+                                              "--out",
+                                              (folder / copy.name).string())};
+  }
+  return {};
+}
+
+/// A copy of what is no more in the operation is taken away: it would be taken for the present. For good before the
+/// operation is written, for after a power cut a copy that is back would be taken for somebody's own.
+Result<void> remove_copies(const fs::path& folder, const Operation& operation, const nlohmann::json& former) {
+  bool removed = false;
+  for (const Copy& copy : copies_of(operation)) {
+    std::error_code ignored;
+    removed = (!copy.written && former.contains(copy.part) && fs::remove(folder / copy.name, ignored)) || removed;
+  }
+  return removed ? sync_folder(folder) : Result<void>();
+}
+
 Result<void> write_copies(const fs::path& folder, const Operation& operation) {
-  std::error_code ignored;
   std::vector<FileText> copies;
   if (const auto& found = operation.calibrated) {
     copies.push_back({folder / kCamera, camera_file(found->scope)});
     copies.push_back({folder / kHandEye, pose_text(found->scope.camera_from_sensor().matrix())});
-  } else {
-    fs::remove(folder / kCamera, ignored);
-    fs::remove(folder / kHandEye, ignored);
   }
   if (const auto& found = operation.registered) {
     copies.push_back({folder / kRegistration, registration_text({found->tracker_from_patient.inverse(),
                                                                  operation.ct_sha256, "", found->fre_mm})});
-  } else {
-    fs::remove(folder / kRegistration, ignored);
   }
   if (operation.deformed) {
     if (auto written = write_field(folder / kField, operation.deformed->field); !written) return written;
-  } else {
-    fs::remove(folder / kField, ignored);
   }
   return write_files(copies);
 }
@@ -128,6 +168,10 @@ Result<Operation> operation_of(const nlohmann::json& sheet) {
 }  // namespace
 
 Result<void> write_operation(const fs::path& folder, const Operation& operation, const ThisMachine& machine) {
+  const nlohmann::json former = former_sheet(folder);
+  if (auto checked = check_copies(folder, operation, former); !checked) return checked;
+  // While the former operation still tells that they are its own.
+  if (auto removed = remove_copies(folder, operation, former); !removed) return removed;
   if (auto written = write_file(folder / kSheet, sheet_text(operation, machine)); !written) return written;
   return write_copies(folder, operation);
 }
@@ -164,8 +208,7 @@ Result<SignedOperation> read_signed_operation(const fs::path& given) {
   const auto refused = [&path](const std::string& why) {
     return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), why)};
   };
-  constexpr std::size_t kMostBytes = 16U << 20U;  // a hundred times what one has
-  const auto text = read_whole_file(path, kMostBytes);
+  const auto text = read_whole_file(path, kMostSheet_bytes);
   if (!text && text.error().code == Errc::not_found) {
     return Error{Errc::not_found,
                  fmt::format("{}: is not there; give the --out folder of an earlier live", path.string())};
@@ -207,6 +250,17 @@ Result<void> check_patient(const Operation& operation, const std::string& ct_sha
   if (!operation.labels_sha256.empty() && !labels_sha256.empty() && operation.labels_sha256 != labels_sha256)
     return Error{Errc::bad_value, "is of other labels; give those"};
   return {};
+}
+
+Result<void> check_target(const Operation& operation, const Eigen::Vector3d& target_at_rest_mm) {
+  constexpr double kSame_mm = 0.5;
+  if (!operation.deformed || !operation.deformed->target_at_rest_mm) return {};
+  const Eigen::Vector3d& then_mm = *operation.deformed->target_at_rest_mm;
+  if ((then_mm - target_at_rest_mm).norm() <= kSame_mm) return {};
+  return Error{Errc::bad_value,
+               fmt::format("says how far the target at {:.1f} {:.1f} {:.1f} may be off, and the target "
+                           "is another now; give the same --landmarks and --labels",
+                           then_mm.x(), then_mm.y(), then_mm.z())};
 }
 
 }  // namespace birdseye::host

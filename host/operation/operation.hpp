@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -30,7 +31,8 @@ struct Operation {
 
 /// operation.json holds all of it, sealed and signed by this machine: not one bit of it may change. It is written
 /// first, and whole. Beside it, for other programs, stand copies of what is in it: camera.yaml, camera_from_sensor.txt,
-/// patient_from_tracker.txt and field.mha, as far as there are such; nothing here reads them.
+/// patient_from_tracker.txt and field.mha, as far as there are such; nothing here reads them. Where a file by such a
+/// name is there that the operation in the folder did not write, nothing is written, and the error names the file.
 Result<void> write_operation(const std::filesystem::path& folder, const Operation& operation,
                              const ThisMachine& machine);
 bool has_operation(const std::filesystem::path& folder);
@@ -52,5 +54,9 @@ Result<SignedOperation> read_signed_operation(const std::filesystem::path& path)
 /// ct_sha256: host/overlay/ct_sha256.hpp; labels_sha256: host/files/files_sha256.hpp, or empty where no labels are
 /// given.
 Result<void> check_patient(const Operation& operation, const std::string& ct_sha256, const std::string& labels_sha256);
+
+/// Refuses a deformation whose expected error is of another target than this one, in the CT as it was taken. What does
+/// not say which target that was passes.
+Result<void> check_target(const Operation& operation, const Eigen::Vector3d& target_at_rest_mm);
 
 }  // namespace birdseye::host

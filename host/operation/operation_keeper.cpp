@@ -17,12 +17,15 @@ OperationKeeper::OperationKeeper(std::filesystem::path out, std::filesystem::pat
     : out_(std::move(out)), resume_(std::move(resume)), authors_(std::move(authors)) {}
 
 Result<std::optional<Operation>> OperationKeeper::take_up(const std::string& ct_sha256,
-                                                          const std::string& labels_sha256) {
+                                                          const std::string& labels_sha256,
+                                                          const Eigen::Vector3d& target_at_rest_mm) {
   const std::filesystem::path folder = std::exchange(resume_, {});
   if (folder.empty()) return std::optional<Operation>();
   auto operation = read_operation(folder, authors_);
   if (operation) {
-    if (auto same = check_patient(*operation, ct_sha256, labels_sha256); !same)
+    auto same = check_patient(*operation, ct_sha256, labels_sha256);
+    if (same) same = check_target(*operation, target_at_rest_mm);
+    if (!same)
       operation = Error{same.error().code,
                         fmt::format("{}: {}, or go on without --resume", folder.string(), same.error().what)};
   }

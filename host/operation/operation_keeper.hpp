@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -22,9 +23,11 @@ class OperationKeeper {
   OperationKeeper(const OperationKeeper&) = delete;
   OperationKeeper& operator=(const OperationKeeper&) = delete;
 
-  /// Of another CT or other labels nothing is taken up. Once: the second time, and where nothing was to be taken up, it
-  /// is empty. An error names the folder; nothing is written into it from then on, for what is there may yet be needed.
-  Result<std::optional<Operation>> take_up(const std::string& ct_sha256, const std::string& labels_sha256);
+  /// Of another CT, other labels or a deformation that was judged by another target nothing is taken up. Once: the
+  /// second time, and where nothing was to be taken up, it is empty. An error names the folder; nothing is written into
+  /// it from then on, for what is there may yet be needed.
+  Result<std::optional<Operation>> take_up(const std::string& ct_sha256, const std::string& labels_sha256,
+                                           const Eigen::Vector3d& target_at_rest_mm);
   /// Stamped now. Not before what is there has been taken up. Of several in a row the last is written at any rate.
   void keep(Operation operation);
   /// Hears what became of each that was written, and begins the next. What could not be kept is written again every

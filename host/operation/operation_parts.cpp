@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -91,6 +92,7 @@ Json json_of(const CalibratedScope& found) {
   enter(json, "camera_rms_px", figures.camera_rms_px);
   enter(json, "held_out_px", figures.held_out_px);
   enter(json, "held_out_mm", figures.held_out_mm);
+  if (found.scope.has_rod()) json["rod"] = "turns, and at which angle it was is not kept";
   if (figures.hand_eye_stations) json["hand_eye_stations"] = *figures.hand_eye_stations;
   return json;
 }
@@ -103,6 +105,8 @@ Json json_of(const RegisteredPatient& found) {
             {"fre_mm", found.fre_mm},
             {"fiducials_in_patient_mm", Json::array()}};
   if (!found.found_with.reference.empty()) json["reference"] = found.found_with.reference;
+  if (!found.doubt.empty()) json["doubt"] = found.doubt;
+  if (!found.off_mm.empty()) json["off_mm"] = found.off_mm;
   for (const Eigen::Vector3d& place : found.fiducials_in_patient_mm)
     json["fiducials_in_patient_mm"].push_back({place.x(), place.y(), place.z()});
   return json;
@@ -122,6 +126,8 @@ Json json_of(const DeformedOrgan& found) {
   enter(json, "seen_rms_mm", found.seen_rms_mm);
   if (!found.care.empty()) json["with_care"] = found.care;
   if (found.target) json["target"] = {{"rms_mm", found.target->rms_mm}, {"radius95_mm", found.target->radius95_mm}};
+  if (const auto& at_mm = found.target_at_rest_mm; found.target && at_mm)
+    json["target"]["at_rest_mm"] = {at_mm->x(), at_mm->y(), at_mm->z()};
   return json;
 }
 
@@ -141,6 +147,7 @@ Result<CalibratedScope> calibrated_of(const Json& json) {
   if (json.contains("hand_eye_covariance"))
     figures.hand_eye_covariance = matrix_of<Eigen::Matrix<double, 6, 6>>(json.at("hand_eye_covariance"));
   if (json.contains("hand_eye_stations")) figures.hand_eye_stations = whole_number_of(json.at("hand_eye_stations"));
+  figures.rod_angle_missing = json.contains("rod");
   auto scope = ScopeSetup::of_values(camera, covariance, Transform<Camera, Sensor>::from_matrix(hand_eye), figures);
   if (!scope) return scope.error();
   if (lens.contains("round_field"))
@@ -166,6 +173,10 @@ Result<RegisteredPatient> registered_of(const Json& json) {
   for (const Json& place : places)
     out.fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
                                              place.at(2).get<double>());
+  out.doubt = json.value("doubt", "");
+  if (json.contains("off_mm")) json.at("off_mm").get_to(out.off_mm);
+  for (const auto& [place, off_mm] : out.off_mm)
+    if (!(off_mm >= 0)) return Error{Errc::bad_value, fmt::format("off_mm of {} is {:g}", place, off_mm)};
   if (auto sound = check_figures(out); !sound) return sound.error();
   return out;
 }
@@ -194,6 +205,10 @@ Result<DeformedOrgan> deformed_of(const Json& json) {
   if (json.contains("target")) {
     const Json& target = json.at("target");
     out.target = {target.at("rms_mm").get<double>(), target.at("radius95_mm").get<double>()};
+    if (target.contains("at_rest_mm")) {
+      const auto at_mm = target.at("at_rest_mm").get<std::array<double, 3>>();
+      out.target_at_rest_mm = {at_mm[0], at_mm[1], at_mm[2]};
+    }
   }
   if (auto sound = check_figures(out); !sound) return sound.error();
   return out;

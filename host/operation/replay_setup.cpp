@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/record/calibration_record.hpp"
 #include "calibration/record/sha256.hpp"
 #include "drivers/system/clock.hpp"
@@ -72,6 +73,19 @@ Result<Transform<To, From>> read_transform(const std::filesystem::path& path) {
   const auto matrix = read_pose(path);
   if (!matrix) return matrix.error();
   return Transform<To, From>::from_matrix(*matrix);
+}
+
+/// What a person states in place of what was found has to be an error that can be.
+Result<void> check_stated(const ReplayInputs& inputs) {
+  const auto check = [](const char* option, const std::optional<double>& figure, bool may_be_0) -> Result<void> {
+    if (!figure || (is_measured_error(*figure) && (may_be_0 || *figure > 0))) return {};
+    return Error{Errc::bad_value,
+                 fmt::format("{} {:g}: no measurement is off so much; give a number {}, or leave it out", option,
+                             *figure, may_be_0 ? "from 0 on" : "above 0")};
+  };
+  if (auto sound = check("--camera-rms-px", inputs.camera_rms_px, false); !sound) return sound;
+  if (auto sound = check("--hand-eye-rms-px", inputs.held_out_px, false); !sound) return sound;
+  return check("--fre-mm", inputs.fre_mm, true);
 }
 
 Result<ScopeSetup> scope_of(const ReplayInputs& inputs, const std::optional<CalibrationRecord>& record) {
@@ -206,6 +220,7 @@ Result<ReplaySetup> setup_of_operation(const ReplayInputs& inputs, const Told& t
 }  // namespace
 
 Result<ReplaySetup> read_replay_setup(const ReplayInputs& inputs) {
+  if (auto sound = check_stated(inputs); !sound) return sound.error();
   const auto told = told_by(inputs);
   if (!told) return told.error();
   if (!inputs.operation.empty()) return setup_of_operation(inputs, *told);

@@ -268,6 +268,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"note_check_no_pointer", "not confirmed: the pointer is not seen. Hold its tip to a landmark, or register anew"},
     {"note_check_second",
      "{:.1f} mm from {}: it fits there. Now hold the pointer to another place, at least 30 mm away, and press Space"},
+    {"note_check_refused", "fits ({:.1f} mm from {}), but {} was off: point at that again, or register anew"},
     {"note_check_off", "not confirmed: the pointer is {:.0f} mm from {}. Point at it again, or register anew"},
 
     // Run, and how the overlay is drawn
@@ -389,6 +390,8 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"note_doubt", "{}; {}"},
     {"note_touched_fre", "{} touched, FRE {:.2f} mm"},
     {"note_taken_up_fre", "{}, FRE {:.2f} mm"},
+    {"note_board_other_scope", "the scope was exchanged meanwhile: what the board gave is of the former, and not used"},
+    {"note_deformed_unknown", "what was kept does not say how far its target may be off: keep views anew"},
     {"note_calibrated_anew", "the scope was calibrated anew: keep views again"},
     {"note_taken_up", "taken up from {}"},
     {"note_no_stroke", "no stroke: {}"},

@@ -382,7 +382,8 @@ void OperationLaws::take(const host::ShownPicture& shown, const host::LivePictur
   const Eigen::Vector3d target_mm = truth_.target_mm() + truth_.organ(exposed_s).shift_mm;
   const Eigen::Vector3d true_mm = truth_.camera_from_patient(exposed_s) * target_mm;
   const auto true_px = project(truth_.lens(exposed_s), true_mm);
-  const auto drawn_px = project(picture.setup()->camera(), Eigen::Vector3d(*drawn_from * truth_.target_mm()));
+  const Eigen::Vector3d shown_mm = picture.figures().target_in_patient_mm.value_or(truth_.target_mm());
+  const auto drawn_px = project(picture.setup()->camera(), Eigen::Vector3d(*drawn_from * shown_mm));
   if (!true_px || !drawn_px) return;
   ++figures_.judged;
   const double off_mm = (*true_px - *drawn_px).norm() / truth_.lens(exposed_s).fx_px * true_mm.z();

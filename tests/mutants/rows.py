@@ -175,7 +175,7 @@ MUTANTS = (
            "A calibration that was held back comes back, whatever scope the new record is of.",
            r"^Operation\.AnotherScopeIsDrawnWithByItsOwnRecord", OPERATION),
     Mutant("fsync", "host/files/write_files.cpp",
-           "    if (auto synced = sync_file(part_of(file.path)); !synced) return give_up(synced.error());\n", "",
+           "    if (auto synced = sync_file(part); !synced) return give_up(synced.error());\n", "",
            "A file gets its name before its bytes are on the disk.", r"^WriteFiles\.IsOnTheDiskByItsName",
            ("host_files_test",)),
     Mutant("seldom-synced", "device/birdseyed/recorder.cpp",

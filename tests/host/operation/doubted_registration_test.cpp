@@ -323,6 +323,77 @@ TEST_F(Doubted, IsALaterLandmarkThatDoesNotFitAndTheFormerCountsNoMore) {
   EXPECT_FALSE(workflow_.view().checked);
 }
 
+/// Fiducials fit because they were made to fit: the skin may have shifted with them.
+TEST_F(Doubted, IsNotConfirmedByFittedFiducialsWhereALandmarkWasOff) {
+  check_at(workflow_, kTumour + Eigen::Vector3d(0, 0, 12));
+  ASSERT_FALSE(drawn());
+  check_at(workflow_, kFiducials[0]);
+  check_at(workflow_, kFiducials[1]);
+  EXPECT_FALSE(drawn()) << said();
+  EXPECT_NE(said().find("but tumour was off"), std::string::npos) << said();
+  check_at(workflow_, kTumour);
+  EXPECT_TRUE(drawn()) << said();
+}
+
+TEST_F(Doubted, IsOffWhereALandmarkWasOffWhateverWasDoubtedSince) {
+  check_at(workflow_, kTumour + Eigen::Vector3d(0, 0, 7.5));
+  ASSERT_TRUE(drawn());
+  pause();
+  check_at(workflow_, kFiducials[0]);
+  check_at(workflow_, kFiducials[1]);
+  ASSERT_TRUE(drawn()) << said();
+  EXPECT_NEAR(workflow_.picture().figures().target_mm.value_or(0), 7.5, 0.1);
+}
+
+/// What was touched ten minutes ago nobody has just seen.
+TEST_F(Doubted, IsARegistrationThatIsFittedAnewLongAfterItsTouches) {
+  workflow_.go_to(LiveStep::run);
+  wire::Birds birds;
+  birds.birds.push_back({"scope", Transform<Tracker, Sensor>()});
+  const auto seen_at = [&](std::int64_t s) {
+    birds.acquired = DeviceTime{1000 * s * birdseye::testing::kMs};
+    workflow_.take(birds, HostTime{birds.acquired.ns}, ClockGap{});
+  };
+  seen_at(10);
+  wire::VideoFrame frame;
+  for (std::int64_t s = 11; s <= 600; ++s) {
+    frame.info.acquired = DeviceTime{1000 * s * birdseye::testing::kMs};
+    workflow_.take(frame, HostTime{frame.info.acquired.ns}, ClockGap{});
+  }
+  workflow_.go_to(LiveStep::fiducials);
+  for (int asked = 0; asked < 2 && workflow_.view().touches.size() == 4; ++asked) workflow_.take_back(3);
+  ASSERT_EQ(workflow_.view().touches.size(), 3U);
+  seen_at(605);
+  EXPECT_FALSE(drawn()) << "the scope was away for ten minutes";
+}
+
+/// What fitted one registration tells nothing of another.
+TEST_F(Doubted, IsNotConfirmedByAPlaceThatFittedAFormerFit) {
+  pause();
+  check_at(workflow_, kFiducials[0]);
+  ASSERT_TRUE(workflow_.view().fits_at_one);
+  workflow_.go_to(LiveStep::fiducials);
+  for (int asked = 0; asked < 2 && workflow_.view().touches.size() == 4; ++asked) workflow_.take_back(3);
+  EXPECT_FALSE(workflow_.view().fits_at_one);
+}
+
+TEST_F(Doubted, EndsAStroke) {
+  workflow_.go_to(LiveStep::views);
+  workflow_.stroke();
+  ASSERT_TRUE(workflow_.view().stroking);
+  pause();
+  EXPECT_FALSE(workflow_.view().stroking) << "the way to a landmark is no organ's surface";
+}
+
+TEST_F(Doubted, IsARegistrationWhoseMachineSlept) {
+  workflow_.note_sleep(Duration::from_ms(500));
+  workflow_.note_sleep(Duration::from_ms(900));
+  EXPECT_TRUE(drawn());
+  workflow_.note_sleep(Duration::from_ms(600'000));
+  EXPECT_FALSE(drawn());
+  EXPECT_EQ(workflow_.view().step, LiveStep::check);
+}
+
 /// Of a registration that nothing speaks against nobody has to look.
 TEST_F(Doubted, IsNotARegistrationOfWhichNobodyLooked) {
   check_at(workflow_, {0, 0, 200});

@@ -205,6 +205,36 @@ TEST_F(HeldBack, AServerThatTellsOfNoInstrumentIsAskedAboutAtAReconnection) {
   EXPECT_TRUE(overlaid()) << reason();
 }
 
+/// The pedal is pressed after a reconnection, before the appliance has told which tracker it has.
+TEST_F(HeldBack, APersonsWordDoesNotMakeAnotherTrackerOfOneThatIsToldLater) {
+  workflow_.set_link(false, "gone");
+  workflow_.set_link(true, "connected");
+  show_frame();
+  workflow_.set_link(true, "connected");
+  workflow_.primary(HostTime{0});
+  tell_health(workflow_, kOtherTracker);
+  give_record(workflow_);
+  show_frame();
+  EXPECT_FALSE(overlaid()) << "a person does not overrule a tracker";
+  EXPECT_NE(reason().find("4712"), std::string::npos) << reason();
+  tell_health(workflow_);
+  show_frame();
+  EXPECT_TRUE(overlaid()) << reason();
+}
+
+/// A fiducial that is dropped meanwhile is in no fit any more.
+TEST_F(HeldBack, WhatIsFittedAnewMeanwhileIsFittedOnceItIsBack) {
+  ASSERT_EQ(workflow_.view().touches.size(), 4U);
+  workflow_.set_link(false, "gone");
+  workflow_.drop_marker(kFiducials[3]);
+  workflow_.set_link(true, "connected");
+  tell_health(workflow_);
+  give_record(workflow_);
+  workflow_.set_link(true, "connected");
+  EXPECT_TRUE(workflow_.view().fits_poorly || !workflow_.view().touches[3].residual_mm)
+      << "the touch of a fiducial that there is none of fits nothing";
+}
+
 TEST_F(HeldBack, AfterAPauseSomebodyLooksWhetherTheRegistrationHolds) {
   show_frame(9'000);
   EXPECT_TRUE(overlaid()) << reason();

@@ -280,6 +280,57 @@ TEST(LiveWorkflow, AnotherPatientsRegistrationIsNotTakenUp) {
   EXPECT_EQ(birdseye::testing::contents_of(scratch / "patient_from_tracker.txt"), kept);
 }
 
+/// A look at a landmark before the window was closed counts after it.
+TEST(LiveWorkflow, HowFarALandmarkWasOffIsTakenUp) {
+  const Scratch scratch;
+  Operation kept = registered_operation(resumed(scratch, scratch.path()));
+  kept.registered->off_mm = {{"tumour", 7.5}};
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  LiveWorkflow workflow(resumed(scratch, scratch.path()));
+  connect(workflow);
+  load(workflow);
+  give_record(workflow);
+  birdseye::testing::check_at(workflow, kFiducials[0]);
+  birdseye::testing::check_at(workflow, kFiducials[1]);
+  ASSERT_TRUE(workflow.picture().setup().has_value()) << workflow.view().note(LiveStep::check).line;
+  EXPECT_NEAR(workflow.picture().figures().target_mm.value_or(0), 7.5, 0.1);
+}
+
+TEST(LiveWorkflow, ADeformationThatWasJudgedByAnotherTargetIsNotTakenUpAndNotLost) {
+  const Scratch scratch;
+  Operation kept = registered_operation(resumed(scratch, scratch.path()));
+  kept.calibrated = birdseye::testing::calibrated_by(birdseye::testing::straight_scope_record());
+  auto organ = *birdseye::testing::moved_to_the_left();
+  organ.target_at_rest_mm = {80, 80, 80};
+  kept.deformed = std::make_shared<const DeformedOrgan>(organ);
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  {
+    LiveWorkflow workflow(resumed(scratch, scratch.path()));
+    connect(workflow);
+    load(workflow);
+    EXPECT_NE(workflow.view().fault.find("the target is another now"), std::string::npos) << workflow.view().fault;
+    EXPECT_FALSE(workflow.view().deformed);
+  }
+  EXPECT_TRUE(read_operation(scratch.path())->deformed);
+}
+
+TEST(LiveWorkflow, ADeformationOfWhoseTargetNothingIsKnownIsNotTakenUp) {
+  const Scratch scratch;
+  Operation kept = registered_operation(resumed(scratch, scratch.path()));
+  kept.calibrated = birdseye::testing::calibrated_by(birdseye::testing::straight_scope_record());
+  auto organ = *birdseye::testing::moved_to_the_left();
+  organ.target.reset();
+  kept.deformed = std::make_shared<const DeformedOrgan>(organ);
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  LiveWorkflow workflow(resumed(scratch, scratch.path()));
+  connect(workflow);
+  load(workflow);
+  give_record(workflow);
+  EXPECT_FALSE(workflow.view().deformed);
+  EXPECT_NE(workflow.view().note(LiveStep::views).line.find("does not say how far"), std::string::npos)
+      << workflow.view().note(LiveStep::views).line;
+}
+
 /// The scope's calibration in an operation that was kept, and the appliance's record, made before or after it.
 TEST(LiveWorkflow, OfTwoCalibrationsTheNewerCounts) {
   const Scratch scratch;

@@ -51,7 +51,7 @@ Operation whole_operation() {
   for (int i = 0; i < 12; ++i) field.displacement_mm.emplace_back(0.1F * static_cast<float>(i % 5), -1.0F / 3, 0.0F);
   field.patient_from_lattice = Eigen::Translation3d(-50, -50, -50) * Eigen::Scaling(100.0);
   out.deformed = std::make_shared<const DeformedOrgan>(
-      DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}, "2026-11-22T09:55:00Z", "few views"});
+      DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}, "2026-11-22T09:55:00Z", Eigen::Vector3d{1, 2, 3}, "few views"});
   return out;
 }
 
@@ -83,6 +83,35 @@ TEST(Operation, IsReadBackToTheBit) {
   EXPECT_EQ(read->deformed->target->radius95_mm, 1.2);
   EXPECT_EQ(read->deformed->care, "few views");
   EXPECT_TRUE(read_operation(scratch / "operation.json")) << "the file itself is named as well as its folder";
+}
+
+TEST(Operation, KeepsWhatSpeaksAgainstARegistrationAndADeformation) {
+  const Scratch scratch;
+  Operation kept = whole_operation();
+  kept.registered->doubt = "mirrored or not cannot be told";
+  kept.registered->off_mm = {{"tumour", 7.5}};
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  const auto read = read_operation(scratch.path());
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->registered->doubt, kept.registered->doubt);
+  EXPECT_EQ(read->registered->off_mm, kept.registered->off_mm);
+  EXPECT_EQ(read->deformed->target_at_rest_mm, Eigen::Vector3d(1, 2, 3));
+  EXPECT_TRUE(check_target(*read, {1, 2, 3.4}));
+  const auto other = check_target(*read, {80, 80, 80});
+  ASSERT_FALSE(other);
+  EXPECT_NE(other.error().what.find("1.0 2.0 3.0"), std::string::npos) << other.error().what;
+}
+
+/// At which angle a rod was an operation does not keep, and nothing is drawn by another.
+TEST(Operation, OfAScopeWithARodTheAngleIsMissing) {
+  const Scratch scratch;
+  Operation kept = whole_operation();
+  kept.calibrated = testing::calibrated_by(testing::example_record(768, 576, kTracker, kCamera));
+  ASSERT_TRUE(kept.calibrated->scope.has_rod());
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  const auto read = read_operation(scratch.path());
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_TRUE(read->calibrated->scope.figures().rod_angle_missing);
 }
 
 /// The names of the part that a place of the text lies in; of a comma or an end of line, of the two about it.
@@ -162,6 +191,24 @@ TEST(Operation, TheCopiesBesideItAreForOthersAndAreNotRead) {
     EXPECT_FALSE(std::filesystem::exists(scratch / copy)) << copy;
 }
 
+TEST(Operation, FilesOfTheUsersOwnByTheNamesOfCopiesAreLeftAlone) {
+  Operation bare = whole_operation();
+  bare.calibrated.reset();
+  bare.registered.reset();
+  bare.deformed.reset();
+  for (const char* const name : {"patient_from_tracker.txt", "camera_from_sensor.txt", "camera.yaml", "field.mha"}) {
+    const Scratch scratch;
+    const std::string own = scratch.file(name, "the user's own");
+    const auto refused = write_operation(scratch.path(), whole_operation(), *testing::authors().machine);
+    ASSERT_FALSE(refused) << name;
+    EXPECT_NE(refused.error().what.find(std::string(name) + ": is there"), std::string::npos) << refused.error().what;
+    EXPECT_FALSE(has_operation(scratch.path())) << "a later write would take the file for its own";
+    for (int n = 0; n < 2; ++n) ASSERT_TRUE(write_operation(scratch.path(), bare, *testing::authors().machine));
+    EXPECT_FALSE(write_operation(scratch.path(), whole_operation(), *testing::authors().machine)) << name;
+    EXPECT_EQ(contents_of(own), "the user's own");
+  }
+}
+
 /// Where the power goes, there is a temporary file that was begun, and the former operation.
 TEST(Operation, WhatAPowerCutLeavesIsTheFormerOperation) {
   const Scratch scratch;
@@ -169,15 +216,14 @@ TEST(Operation, WhatAPowerCutLeavesIsTheFormerOperation) {
   const std::string text = contents_of(scratch / "operation.json");
   for (const std::size_t length : {std::size_t{0}, text.size() / 2, text.size()}) {
     (void)scratch.file("operation.json.part", text.substr(0, length));
-    (void)scratch.file("part-field.mha", "ObjectType");
+    std::filesystem::create_directories(scratch / "part-a1B2c3");
+    (void)scratch.file("part-a1B2c3/field.mha", "ObjectType");
     const auto read = read_operation(scratch.path());
     ASSERT_TRUE(read) << read.error().what;
     Operation next = whole_operation();
     next.registered->fre_mm = 0.2;
     ASSERT_TRUE(write_operation(scratch.path(), next, *testing::authors().machine));
     EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 0.2);
-    EXPECT_FALSE(std::filesystem::exists(scratch / "operation.json.part"));
-    EXPECT_FALSE(std::filesystem::exists(scratch / "part-field.mha"));
   }
 }
 
@@ -192,7 +238,7 @@ TEST(OperationKeeper, AfterARefusalKeepsWhatIsFoundInAnotherFolderOnly) {
   next.ct_sha256 = "another";
   const auto keep_in = [&](const std::filesystem::path& out) {
     OperationKeeper keeper(out, refused, testing::authors());
-    const auto taken = keeper.take_up("another", "2");
+    const auto taken = keeper.take_up("another", "2", {});
     EXPECT_FALSE(taken);
     keeper.keep(next);
     return taken ? std::string() : taken.error().what;  // the keeper's end waits until all is written
@@ -322,17 +368,17 @@ TEST(OperationKeeper, KeepsNothingBeforeItHasTakenUpNorOverAnotherCts) {
   other.registered->fre_mm = 7;
   OperationKeeper keeper(scratch.path(), scratch.path(), testing::authors());
   keeper.keep(other);
-  const auto kept = keeper.take_up("1", "");
+  const auto kept = keeper.take_up("1", "", {1, 2, 3});
   ASSERT_TRUE(kept) << kept.error().what;
   EXPECT_EQ((*kept)->registered->fre_mm, 0.3);
-  EXPECT_FALSE((*keeper.take_up("1", "")).has_value()) << "once";
+  EXPECT_FALSE((*keeper.take_up("1", "", {1, 2, 3})).has_value()) << "once";
   keeper.keep(other);
   wait_for(keeper);
   keeper.tick();
   EXPECT_EQ(keeper.fault(), "");
   EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 7);
   OperationKeeper wrong(scratch.path(), scratch.path(), testing::authors());
-  EXPECT_FALSE(wrong.take_up("2", ""));
+  EXPECT_FALSE(wrong.take_up("2", "", {}));
   wrong.keep(one);
   wait_for(wrong);
   EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 7);
@@ -341,9 +387,9 @@ TEST(OperationKeeper, KeepsNothingBeforeItHasTakenUpNorOverAnotherCts) {
 TEST(OperationKeeper, OfOtherLabelsNothingIsTakenUp) {
   const Scratch scratch;
   OperationKeeper(scratch.path(), {}, testing::authors()).keep(whole_operation());
-  EXPECT_TRUE(OperationKeeper({}, scratch.path(), testing::authors()).take_up("1", "2"));
-  EXPECT_TRUE(OperationKeeper({}, scratch.path(), testing::authors()).take_up("1", "")) << "none are shown";
-  const auto other = OperationKeeper({}, scratch.path(), testing::authors()).take_up("1", "3");
+  EXPECT_TRUE(OperationKeeper({}, scratch.path(), testing::authors()).take_up("1", "2", {1, 2, 3}));
+  EXPECT_TRUE(OperationKeeper({}, scratch.path(), testing::authors()).take_up("1", "", {1, 2, 3})) << "none are shown";
+  const auto other = OperationKeeper({}, scratch.path(), testing::authors()).take_up("1", "3", {1, 2, 3});
   ASSERT_FALSE(other);
   EXPECT_NE(other.error().what.find("is of other labels"), std::string::npos) << other.error().what;
 }

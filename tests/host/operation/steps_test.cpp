@@ -105,13 +105,25 @@ TEST(CalibrationStep, ARecordOfAnotherScopeCountsThoughTheBoardWasUsedLater) {
   }
 }
 
+TEST(CalibrationStep, ARecordThatWasWithdrawnTellsNoScope) {
+  CalibrationStep step;
+  auto record = example_record(768, 576, {}, {});
+  record.scope = "scope no. 18";
+  EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::again);
+  EXPECT_TRUE(step.withdraw_record("it was taken away"));
+  CalibratedScope board = kept_scope();
+  board.made_utc = "2026-11-22T09:50:00Z";
+  board.record_scope = "scope no. 17";
+  EXPECT_TRUE(step.take_up(board, "taken up")) << "nothing says that the scope is no. 18";
+}
+
 TEST(CalibrationStep, GuidesOnlyOverABoard) {
   CalibrationStep step;
-  step.begin("scope", std::nullopt);
+  step.begin("scope", std::nullopt, {});
   EXPECT_FALSE(step.guiding());
   EXPECT_FALSE(step.withdraw_record("the tracker is another"));
   EXPECT_EQ(step.note().line, "the tracker is another");
-  step.begin("scope", *calibration::parse_pattern("chessboard:14x9:3mm"));
+  step.begin("scope", *calibration::parse_pattern("chessboard:14x9:3mm"), {});
   EXPECT_TRUE(step.guiding());
   step.end();
   for (int i = 0; i < 1000 && step.guiding(); ++i) {
@@ -125,14 +137,14 @@ TEST(CalibrationStep, GuidesOnlyOverABoard) {
 TEST(CalibrationStep, WhatIsTakenUpGivesUpTheGuideAndItMayBeginAgain) {
   const auto board = calibration::parse_pattern("chessboard:14x9:3mm");
   CalibrationStep step;
-  step.begin("scope", *board);
+  step.begin("scope", *board, {});
   const CalibratedScope kept = kept_scope();
   step.take_up(kept, "taken up");
   EXPECT_FALSE(step.guiding());
   EXPECT_FALSE(step.guide().has_value());
   EXPECT_FALSE(step.tick({}));
   EXPECT_EQ(step.note().line, "taken up");
-  step.begin("scope", *board);
+  step.begin("scope", *board, {});
   ASSERT_TRUE(step.guiding());
   EXPECT_TRUE(step.guide()->collecting);
   step.end();
