@@ -100,7 +100,7 @@ bool CalibrationStep::tick(const Instruments& now) {
   if (!finish(*guided)) return false;
   found_->found_with = begun_with_.link == now.link ? taken_over(now, begun_with_) : begun_with_;
   found_->record_scope = begun_scope_;
-  passed_over_utc_ = record_utc_;
+  found_->in_place_of_utc = record_utc_;
   return true;
 }
 
@@ -127,7 +127,7 @@ CalibrationStep::Adopted CalibrationStep::adopt(const calibration::CalibrationRe
   const std::string& made_utc = record_utc_ = record.hand_eye->provenance.made_utc;
   const auto& before = rests_on();
   // The clocks of two machines may stand otherwise: what the board was used in place of is older for sure.
-  const bool older = before && (made_utc <= before->made_utc || made_utc == passed_over_utc_);
+  const bool older = before && (made_utc <= before->made_utc || made_utc == before->in_place_of_utc);
   if (older && before->by_board && !is_other_scope(*before, record.scope)) return Adopted::no;
   CalibratedScope adopted{*std::move(scope), made_utc, false, {record.tracker, record.camera}, record.scope};
   const bool anew = before && !is_same(*before, adopted);
@@ -142,7 +142,9 @@ bool CalibrationStep::take_up(const CalibratedScope& kept, const std::string& li
     if (!now) former_ = kept;
     return !now || is_same(*now, kept);
   }
-  if (found_ && (kept.made_utc <= found_->made_utc || is_other_scope(kept, record_scope_))) return false;
+  const bool in_place_of_it = found_ && !found_->by_board && kept.in_place_of_utc == found_->made_utc;
+  if (found_ && ((kept.made_utc <= found_->made_utc && !in_place_of_it) || is_other_scope(kept, record_scope_)))
+    return false;
   if (!kept.scope.figures().held_out_px || !kept.scope.figures().held_out_mm) {
     // Nothing could be drawn by it.
     if (!found_) note_.line = words("note_kept_unknown");

@@ -72,7 +72,6 @@ class CalibrationStep {
   std::string record_utc_;                 ///< when the appliance's last record was made
   Instruments begun_with_;                 ///< the guide
   std::string begun_scope_;                ///< record_scope_ then
-  std::string passed_over_utc_;            ///< of the record in whose place the board was used
   std::string line_;                       ///< of what is held back, as it was found
   bool person_may_say_ = false;
   StepNote note_;

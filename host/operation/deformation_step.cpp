@@ -71,7 +71,7 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
     views.push_back(*std::move(view));
     frames.push_back(one.frame);
   }
-  note_ = {false, words("note_matching")};
+  former_note_ = std::exchange(note_, {false, words("note_matching")});
   dropped_ = false;
   target_at_rest_mm_ = target_in_patient_mm(*patient);
   if (made_.patient.lock() != patient || made_.transfer.lock() != transfer) made_ = {patient, transfer, nullptr};
@@ -155,10 +155,11 @@ void DeformationStep::undo() {
 }
 
 void DeformationStep::drop(const std::string& why) {
-  if (!running()) return;
-  dropped_ = true;
+  dropped_ = running();
   cancel();
-  note_.line = why;
+  const bool ended = matching_.take().has_value();  // and nobody has looked at it yet
+  if (!dropped_ && !ended) return;
+  note_ = found_ ? former_note_ : StepNote{false, why};
 }
 
 bool DeformationStep::forget() {

@@ -74,8 +74,8 @@ class DeformationStep {
   std::shared_ptr<const DeformedOrgan> found_;
   std::vector<Transform<Camera, Patient>> adjusted_;
   std::optional<Eigen::Vector3d> target_at_rest_mm_;  ///< that the matching is judged by
-  StepNote note_;
-  bool dropped_ = false;  ///< what is being found is by a setup that is no more
+  StepNote note_, former_note_;                       ///< former_note_: before the matching began
+  bool dropped_ = false;                              ///< what is being found is by a setup that is no more
   Background<Result<Matched>> matching_;
 };
 

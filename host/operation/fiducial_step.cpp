@@ -20,7 +20,7 @@ bool FiducialStep::add(const Touch& touch, std::size_t wanted, const Instruments
   if (held_back_ || !confirmed_) {
     touches_.clear();
     registered_.reset();
-    held_back_ = false;
+    fit_is_due_ = held_back_ = false;
     confirmed_ = true;
   }
   if (wanted != 0 && touches_.size() >= wanted && !may_add_) return false;
@@ -78,6 +78,7 @@ void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& marker
 bool FiducialStep::take_up(const std::optional<RegisteredPatient>& kept, const std::string& when) {
   if (registered_) return false;
   touches_.clear();
+  fit_is_due_ = held_back_ = false;
   if (!kept) return true;
   registered_ = kept;
   found_with_ = kept->found_with;
@@ -93,7 +94,7 @@ void FiducialStep::doubt() {
   if (registered_) confirmed_ = false;
   if (registered_ || touches_.empty()) return;
   touches_.clear();
-  held_back_ = false;
+  fit_is_due_ = held_back_ = false;
   note_ = {false, words("note_touch_anew")};
 }
 

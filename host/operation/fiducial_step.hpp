@@ -28,7 +28,7 @@ class FiducialStep {
   void fit(const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm, std::size_t wanted,
            const Volume* ct);
   /// What is held back was to be fitted anew, as where a marker was dropped, and is back.
-  [[nodiscard]] bool fit_is_due() const { return fit_is_due_ && !held_back_; }
+  [[nodiscard]] bool fit_is_due() const { return fit_is_due_ && !held_back_ && !touches_.empty(); }
   /// An earlier window's registration, which counts for nothing before confirm(): patient or transmitter may have been
   /// moved meanwhile. Not where fiducials were touched anew; false then. Touches too few for a fit are dropped.
   bool take_up(const std::optional<RegisteredPatient>& kept, const std::string& when);

@@ -38,6 +38,8 @@ Result<void> check_figures(const CalibratedScope& found) {
 }
 
 Result<void> check_figures(const RegisteredPatient& found) {
+  for (const PlaceOff& place : found.off)
+    if (auto sound = check_figure("off_mm", place.off_mm); !sound) return sound;
   constexpr double kLeastSpread_mm = 1;
   if (auto sound = check_figure("fre_mm", found.fre_mm); !sound) return sound;
   const auto& places = found.fiducials_in_patient_mm;

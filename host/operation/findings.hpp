@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -22,14 +21,24 @@ struct GuidedCalibration;
 /// How the scope is calibrated.
 struct CalibratedScope {
   ScopeSetup scope;
-  std::string made_utc;        ///< 2026-11-22T09:30:00Z
-  bool by_board = false;       ///< here, by the board; else by a record
-  Instruments found_with{};    ///< of one by a record, those that the record is of, which the appliance judges
-  std::string scope_name{};    ///< as its owner calls it; empty: nobody has told it, as over the board
-  std::string record_scope{};  ///< over the board: the scope of the record that the appliance had then; empty: none
+  std::string made_utc;           ///< 2026-11-22T09:30:00Z
+  bool by_board = false;          ///< here, by the board; else by a record
+  Instruments found_with{};       ///< of one by a record, those that the record is of, which the appliance judges
+  std::string scope_name{};       ///< as its owner calls it; empty: nobody has told it, as over the board
+  std::string record_scope{};     ///< over the board: the scope of the record that the appliance had then; empty: none
+  std::string in_place_of_utc{};  ///< over the board: when the appliance's record then was made; empty: there was none
 };
 /// By what was solved of stations over the board. Refuses, with the first reason, what the verdict fails.
 Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, const std::string& made_utc);
+
+/// How far a place of the CT was off as the pointer was last held there.
+struct PlaceOff {
+  Eigen::Vector3d in_ct_mm;  ///< of the CT as it was taken
+  std::string name;
+  double off_mm = 0;
+  bool deformed = false;  ///< of the CT as it was shown then
+  bool refuses = false;   ///< a landmark that was off by too much to draw, and has not been found to fit since
+};
 
 /// How the patient is registered.
 struct RegisteredPatient {
@@ -38,8 +47,8 @@ struct RegisteredPatient {
   std::vector<Eigen::Vector3d> fiducials_in_patient_mm;  ///< those that were touched: three or more
   Instruments found_with{};                              ///< the tracker counts: touches are in its frame
   std::string made_utc{};
-  std::string doubt{};                     ///< what cannot be told by these touches; empty: nothing
-  std::map<std::string, double> off_mm{};  ///< how far places were off as the pointer was last held there, by name
+  std::string doubt{};  ///< what cannot be told by these touches; empty: nothing
+  std::vector<PlaceOff> off{};
 };
 
 /// How the organ is deformed, and how well that is known; what was not estimated is absent.

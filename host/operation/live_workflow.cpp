@@ -56,7 +56,7 @@ void LiveWorkflow::tick() {
   update_setup();
   judge_instruments();
   keep();
-  if (step_ != LiveStep::calibrate) return;
+  if (step_ != LiveStep::calibrate || !calibration_.found()) return;
   const bool all_touched = settings_.fiducials != 0 && fiducials_.fits();
   go_to(all_touched ? LiveStep::views : LiveStep::fiducials);
 }
@@ -217,7 +217,7 @@ void LiveWorkflow::confirm_instruments() {
 }
 
 void LiveWorkflow::fit() {
-  const auto before = fiducials_.registered();
+  const auto before = fiducials_.registered_or_held_back();
   // Nothing is registered with a CT of which nobody has said whose it is.
   if (patient_confirmed_ || !patient_.plan()) {
     fiducials_.fit(patient_.markers_in_patient_mm(), settings_.fiducials,
@@ -225,12 +225,11 @@ void LiveWorkflow::fit() {
   } else {
     fiducials_.fit(std::nullopt, settings_.fiducials, nullptr);
   }
-  const auto registered = fiducials_.registered();
+  const auto& registered = fiducials_.registered_or_held_back();
   const bool same =
       before && registered && before->tracker_from_patient.matrix() == registered->tracker_from_patient.matrix();
   if (!same) {
-    off_mm_.clear();
-    refused_by_.clear();
+    off_.forget();
     fits_at_mm_.reset();
   }
   asked_to_take_back_.reset();
@@ -254,6 +253,7 @@ void LiveWorkflow::forget_views(const std::string& why) {
 
 void LiveWorkflow::show_shape() {
   checked_.reset();
+  off_.forget_deformed();
   fits_at_mm_.reset();
   ++shapes_;
   watch_.forget();
@@ -296,8 +296,8 @@ void LiveWorkflow::update_setup() {
   figures.target_in_patient_mm = as_shown_mm(target_in_patient_mm(*patient_.plan()), deformed);
   if (deformed != nullptr) figures.motion_error = deformed->target;
   // Where it was seen to be off by more than is to be expected, the circle is as large as that.
-  for (const auto& [place, off_mm] : off_mm_)
-    if (figures.target_mm) figures.target_mm = std::max(*figures.target_mm, off_mm);
+  if (const auto off_mm = off_.most_mm(deformed != nullptr); off_mm && figures.target_mm)
+    figures.target_mm = std::max(*figures.target_mm, *off_mm);
   figures.moved_mm = motion_.moved_mm();
   video_.enter(figures);
   if (!settings_.video_must_agree) figures.video.reset();
@@ -412,7 +412,9 @@ void LiveWorkflow::take_back(std::size_t touch) {
 void LiveWorkflow::undo() {
   if (step_ == LiveStep::fiducials && !fiducials_.touches().empty()) take_back(fiducials_.touches().size() - 1);
   if (step_ == LiveStep::views && !strokes_.undo(views_.views().size())) views_.undo();
-  if (step_ == LiveStep::check) {
+  // One that speaks against the registration is not to be taken back: only that it fits ends that.
+  const bool speaks_against = !patient_.landmarks().empty() && off_.refuses_at(patient_.landmarks().back().place_mm);
+  if (step_ == LiveStep::check && !speaks_against) {
     patient_.undo_landmark();
     landmarks_before_doubt_ = std::min(landmarks_before_doubt_, patient_.landmarks().size());
   }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <string>
 
@@ -17,6 +16,7 @@
 #include "host/operation/organ_strokes.hpp"
 #include "host/operation/patient_step.hpp"
 #include "host/operation/place_picks.hpp"
+#include "host/operation/places_off.hpp"
 #include "host/operation/pointer_tip.hpp"
 #include "host/operation/reference_sensor.hpp"
 #include "host/operation/surface_watch.hpp"
@@ -158,7 +158,7 @@ class LiveWorkflow {
   void check_registration();
   void check_undoubted(const std::optional<CheckReading>& reading);
   void check_in_doubt(const CheckReading& reading);
-  void note_off(const CheckReading& reading);
+  void note_off(const CheckReading& reading, bool refuses);
   void refuse_registration(const CheckReading& by);
   void confirm_registration(const std::optional<CheckReading>& by);
   void watch_surface(HostTime now);
@@ -200,9 +200,7 @@ class LiveWorkflow {
   std::optional<HostTime> first_heard_;        ///< of this connection
   std::optional<HostTime> pointer_was_;        ///< when the newest pose of the pointer was measured, at the earliest
   std::optional<Eigen::Vector3d> fits_at_mm_;  ///< in doubt, the first place at which it fits; patient frame
-  std::map<std::string, double>
-      off_mm_;              ///< how far each place was off as the pointer was last held there, by the place's name
-  std::string refused_by_;  ///< the landmark that was off, and has not been found to fit since; empty: none
+  PlacesOff off_;
   std::size_t landmarks_before_doubt_ = 0;  ///< that were known as the registration came into doubt
   FiducialStep fiducials_;
   std::optional<std::size_t> asked_to_take_back_;

@@ -115,11 +115,10 @@ void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
 
 void LiveWorkflow::take(const CheckedSurface& checked) {
   if (!deformation_.found() || !motion_.take(checked)) return;
-  deformation_.drop(words("note_views_organ_moved"));
-  if (motion_.moved_mm()) {
-    views_.forget(words("note_views_organ_moved"));
-    strokes_.forget();
-  }
+  const std::string why = motion_.moved_mm() ? words("note_views_organ_moved") : words("note_views_organ_back");
+  deformation_.drop(why);
+  views_.forget(why);
+  strokes_.forget();
   update_setup();
 }
 
@@ -166,7 +165,7 @@ void LiveWorkflow::check_undoubted(const std::optional<CheckReading>& reading) {
   constexpr double kPointedAt_mm = 100;  // further away the pointer is laid aside
   const bool pointed_at = reading && reading->distance_mm <= kPointedAt_mm;
   if (pointed_at && reading->distance_mm > kMostCheckedOff_mm) return refuse_registration(*reading);
-  if (pointed_at) note_off(*reading);
+  if (pointed_at) note_off(*reading, false);
   if (pointed_at && !reading->fitted) return confirm_registration(*reading);
   if (!checked_) check_.line = words("note_unchecked");
   confirm_registration(std::nullopt);
@@ -179,11 +178,10 @@ void LiveWorkflow::check_undoubted(const std::optional<CheckReading>& reading) {
 void LiveWorkflow::check_in_doubt(const CheckReading& reading) {
   constexpr double kApart_mm = 30;  // the two places
   if (reading.distance_mm > kMostCheckedOff_mm) return refuse_registration(reading);
-  note_off(reading);
-  if (reading.nearest == refused_by_) refused_by_.clear();
-  if (!refused_by_.empty()) {
+  note_off(reading, false);
+  if (const PlaceOff* const against = off_.refusing()) {
     if (!fits_at_mm_) fits_at_mm_ = reading.nearest_mm;
-    check_ = {false, words("note_check_refused", reading.distance_mm, reading.nearest, refused_by_)};
+    check_ = {false, words("note_check_refused", reading.distance_mm, reading.nearest, against->name)};
     return;
   }
   if (fits_at_mm_ && (*fits_at_mm_ - reading.nearest_mm).norm() >= kApart_mm) return confirm_registration(reading);
@@ -192,8 +190,8 @@ void LiveWorkflow::check_in_doubt(const CheckReading& reading) {
   check_ = {false, words("note_check_second", reading.distance_mm, reading.nearest)};
 }
 
-void LiveWorkflow::note_off(const CheckReading& reading) {
-  off_mm_[reading.nearest] = reading.distance_mm;
+void LiveWorkflow::note_off(const CheckReading& reading, bool refuses) {
+  off_.note({reading.nearest_mm, reading.nearest, reading.distance_mm, deformation_.found() != nullptr, refuses});
   keep();
 }
 
@@ -202,7 +200,8 @@ void LiveWorkflow::refuse_registration(const CheckReading& by) {
   check_ = {false, why_doubted_};
   checked_.reset();
   fits_at_mm_.reset();
-  if (!by.fitted) refused_by_ = by.nearest;
+  constexpr double kMeant_mm = 30;  // further away it may not have been pointed at
+  if (!by.fitted && by.distance_mm <= kMeant_mm) note_off(by, true);
   note_landmarks();
   fiducials_.doubt();
   update_setup();

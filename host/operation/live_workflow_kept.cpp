@@ -46,7 +46,7 @@ void LiveWorkflow::keep() {
   operation.record_sha256 = record_sha256_;
   operation.calibrated = calibration_.rests_on();
   operation.registered = fiducials_.registered_or_held_back();
-  if (operation.registered) operation.registered->off_mm = off_mm_;
+  if (operation.registered) operation.registered->off = off_.all();
   operation.deformed = deformation_.found();
   // What the next window finds in it rests on the same.
   for (const std::string* doubt : {&record_doubt_, &operation_doubt_, &settings_.recording_doubt, &field_doubt_}) {
@@ -71,13 +71,16 @@ void LiveWorkflow::take_up() {
   // The calibration that is in force may be newer, or nobody knows which one it was: a deformation then means nothing.
   const bool same_scope = kept->calibrated && calibration_.take_up(*kept->calibrated, when);
   const bool taken_up = fiducials_.take_up(kept->registered, when);
-  if (taken_up && kept->registered) off_mm_ = kept->registered->off_mm;
+  if (taken_up && kept->registered) off_.take_up(kept->registered->off);
   // The circle would be too small by what is not known.
   const bool is_known = kept->deformed && kept->deformed->target;
   if (taken_up && same_scope && is_known) {
     deformation_.take_up(kept->deformed, when);
     show_shape();
+    off_.take_up(kept->registered ? kept->registered->off : std::vector<PlaceOff>());  // of this very deformation
+    update_setup();
   } else if (kept->deformed) {
+    off_.forget_deformed();
     views_.forget(is_known ? words("note_calibrated_anew") : words("note_deformed_unknown"));
   }
   judge_instruments();

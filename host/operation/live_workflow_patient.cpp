@@ -70,7 +70,9 @@ void LiveWorkflow::take(const PlacePicks::Picked& picked) {
 }
 
 void LiveWorkflow::drop_marker(const Eigen::Vector3d& place_in_patient_mm) {
+  const auto before = patient_.markers_in_patient_mm();
   const auto which = patient_.drop_marker(place_in_patient_mm);
+  if (which && before) off_.forget_at((*before)[*which]);
   pick_line_ = which ? words("dropped_marker", *which + 1) : words("drop_none", PatientStep::kMarkerReach_mm);
   if (which) fit_anew();
 }

@@ -259,7 +259,7 @@ Result<void> check_target(const Operation& operation, const Eigen::Vector3d& tar
   if ((then_mm - target_at_rest_mm).norm() <= kSame_mm) return {};
   return Error{Errc::bad_value,
                fmt::format("says how far the target at {:.1f} {:.1f} {:.1f} may be off, and the target "
-                           "is another now; give the same --landmarks and --labels",
+                           "is another now; give the same --landmarks or --targets",
                            then_mm.x(), then_mm.y(), then_mm.z())};
 }
 

@@ -84,6 +84,7 @@ Json json_of(const CalibratedScope& found) {
             {"camera_from_sensor", rows_of(found.scope.camera_from_sensor().matrix())}};
   if (!found.scope_name.empty()) json["scope"] = found.scope_name;
   if (!found.record_scope.empty()) json["record_of_scope"] = found.record_scope;
+  if (!found.in_place_of_utc.empty()) json["in_place_of_record_utc"] = found.in_place_of_utc;
   if (const auto& covariance = found.scope.camera_covariance()) json["lens"]["covariance"] = rows_of(*covariance);
   if (const auto& field = found.scope.round_field())
     json["lens"]["round_field"] = calibration::json_of_round_field(*field);
@@ -92,7 +93,7 @@ Json json_of(const CalibratedScope& found) {
   enter(json, "camera_rms_px", figures.camera_rms_px);
   enter(json, "held_out_px", figures.held_out_px);
   enter(json, "held_out_mm", figures.held_out_mm);
-  if (found.scope.has_rod()) json["rod"] = "turns, and at which angle it was is not kept";
+  if (found.scope.has_rod() || figures.rod_angle_missing) json["rod"] = "turns, and at which angle it was is not kept";
   if (figures.hand_eye_stations) json["hand_eye_stations"] = *figures.hand_eye_stations;
   return json;
 }
@@ -106,7 +107,13 @@ Json json_of(const RegisteredPatient& found) {
             {"fiducials_in_patient_mm", Json::array()}};
   if (!found.found_with.reference.empty()) json["reference"] = found.found_with.reference;
   if (!found.doubt.empty()) json["doubt"] = found.doubt;
-  if (!found.off_mm.empty()) json["off_mm"] = found.off_mm;
+  for (const PlaceOff& place : found.off) {
+    json["off"].push_back({{"name", place.name},
+                           {"in_ct_mm", {place.in_ct_mm.x(), place.in_ct_mm.y(), place.in_ct_mm.z()}},
+                           {"off_mm", place.off_mm},
+                           {"deformed", place.deformed},
+                           {"refuses", place.refuses}});
+  }
   for (const Eigen::Vector3d& place : found.fiducials_in_patient_mm)
     json["fiducials_in_patient_mm"].push_back({place.x(), place.y(), place.z()});
   return json;
@@ -156,6 +163,7 @@ Result<CalibratedScope> calibrated_of(const Json& json) {
                       json.at("made_from").get<std::string>() == "board", instruments_of(json),
                       json.value("scope", "")};
   out.record_scope = json.value("record_of_scope", "");
+  out.in_place_of_utc = json.value("in_place_of_record_utc", "");
   if (auto sound = check_figures(out); !sound) return sound.error();
   return out;
 }
@@ -174,9 +182,14 @@ Result<RegisteredPatient> registered_of(const Json& json) {
     out.fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
                                              place.at(2).get<double>());
   out.doubt = json.value("doubt", "");
-  if (json.contains("off_mm")) json.at("off_mm").get_to(out.off_mm);
-  for (const auto& [place, off_mm] : out.off_mm)
-    if (!(off_mm >= 0)) return Error{Errc::bad_value, fmt::format("off_mm of {} is {:g}", place, off_mm)};
+  for (const Json& place : json.value("off", Json::array())) {
+    const auto in_ct_mm = place.at("in_ct_mm").get<std::array<double, 3>>();
+    out.off.push_back({{in_ct_mm[0], in_ct_mm[1], in_ct_mm[2]},
+                       place.at("name").get<std::string>(),
+                       place.at("off_mm").get<double>(),
+                       place.at("deformed").get<bool>(),
+                       place.at("refuses").get<bool>()});
+  }
   if (auto sound = check_figures(out); !sound) return sound.error();
   return out;
 }

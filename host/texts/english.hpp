@@ -326,6 +326,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"landmark_name", "landmark {}"},
 
     // What the steps say of themselves
+    {"note_views_organ_back", "the organ is back where it was: keep views anew"},
     {"note_views_organ_moved", "the organ has moved since: keep views anew"},
     {"note_views_touched_anew", "the fiducials were touched anew: keep views again"},
     {"note_runs", "the overlay runs"},

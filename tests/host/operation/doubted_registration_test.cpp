@@ -335,6 +335,29 @@ TEST_F(Doubted, IsNotConfirmedByFittedFiducialsWhereALandmarkWasOff) {
   EXPECT_TRUE(drawn()) << said();
 }
 
+/// Each landmark that was off has to be found to fit, and what was far from all was not pointed at.
+TEST_F(Doubted, IsNotConfirmedByOneOfTwoLandmarksThatWereOff) {
+  pick_landmark({20, 20, 10});
+  check_at(workflow_, kTumour + Eigen::Vector3d(0, 0, 12));
+  check_at(workflow_, Eigen::Vector3d(20, 20, 10) + Eigen::Vector3d(0, 0, -12));
+  ASSERT_FALSE(drawn());
+  check_at(workflow_, Eigen::Vector3d(20, 20, 10));
+  check_at(workflow_, kFiducials[1]);
+  EXPECT_FALSE(drawn()) << said();
+  check_at(workflow_, kTumour);
+  check_at(workflow_, kFiducials[1]);
+  EXPECT_TRUE(drawn()) << said();
+}
+
+TEST_F(Doubted, IsNotRefusedByALandmarkThatWasNotPointedAt) {
+  pause();
+  check_at(workflow_, kTumour + Eigen::Vector3d(0, 0, 60));
+  ASSERT_FALSE(drawn());
+  check_at(workflow_, kFiducials[0]);
+  check_at(workflow_, kFiducials[1]);
+  EXPECT_TRUE(drawn()) << said();
+}
+
 TEST_F(Doubted, IsOffWhereALandmarkWasOffWhateverWasDoubtedSince) {
   check_at(workflow_, kTumour + Eigen::Vector3d(0, 0, 7.5));
   ASSERT_TRUE(drawn());

@@ -284,7 +284,7 @@ TEST(LiveWorkflow, AnotherPatientsRegistrationIsNotTakenUp) {
 TEST(LiveWorkflow, HowFarALandmarkWasOffIsTakenUp) {
   const Scratch scratch;
   Operation kept = registered_operation(resumed(scratch, scratch.path()));
-  kept.registered->off_mm = {{"tumour", 7.5}};
+  kept.registered->off = {{birdseye::testing::kTumour, "tumour", 7.5, false, false}};
   ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
   LiveWorkflow workflow(resumed(scratch, scratch.path()));
   connect(workflow);
@@ -294,6 +294,42 @@ TEST(LiveWorkflow, HowFarALandmarkWasOffIsTakenUp) {
   birdseye::testing::check_at(workflow, kFiducials[1]);
   ASSERT_TRUE(workflow.picture().setup().has_value()) << workflow.view().note(LiveStep::check).line;
   EXPECT_NEAR(workflow.picture().figures().target_mm.value_or(0), 7.5, 0.1);
+}
+
+TEST(LiveWorkflow, ALandmarkThatRefusedARegistrationRefusesItAfterARestart) {
+  const Scratch scratch;
+  Operation kept = registered_operation(resumed(scratch, scratch.path()));
+  kept.registered->off = {{birdseye::testing::kTumour, "tumour", 12, false, true}};
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  LiveWorkflow workflow(resumed(scratch, scratch.path()));
+  connect(workflow);
+  load(workflow);
+  give_record(workflow);
+  birdseye::testing::check_at(workflow, kFiducials[0]);
+  birdseye::testing::check_at(workflow, kFiducials[1]);
+  EXPECT_FALSE(workflow.picture().setup().has_value());
+  birdseye::testing::check_at(workflow, birdseye::testing::kTumour);
+  EXPECT_TRUE(workflow.picture().setup().has_value()) << workflow.view().note(LiveStep::check).line;
+}
+
+/// Touched before the CT was there, and held back as it came: what was kept is taken up in their place, and stays.
+TEST(LiveWorkflow, WhatIsTakenUpIsNotLostByTouchesThatWereHeldBack) {
+  const Scratch scratch;
+  const LiveSettings again = resumed(scratch, scratch.path());
+  ASSERT_TRUE(write_operation(scratch.path(), registered_operation(again), *testing::authors().machine));
+  LiveWorkflow workflow(again);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
+  hand.rest_at(kFiducials[0], 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_EQ(workflow.view().touches.size(), 1U);
+  workflow.set_link(false, "gone");
+  load(workflow);
+  connect(workflow);
+  give_record(workflow);
+  ASSERT_TRUE(workflow.view().note(LiveStep::fiducials).done) << workflow.view().note(LiveStep::fiducials).line;
+  workflow.finish();
+  EXPECT_TRUE(read_operation(scratch.path())->registered);
 }
 
 TEST(LiveWorkflow, ADeformationThatWasJudgedByAnotherTargetIsNotTakenUpAndNotLost) {

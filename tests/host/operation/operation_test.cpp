@@ -89,12 +89,18 @@ TEST(Operation, KeepsWhatSpeaksAgainstARegistrationAndADeformation) {
   const Scratch scratch;
   Operation kept = whole_operation();
   kept.registered->doubt = "mirrored or not cannot be told";
-  kept.registered->off_mm = {{"tumour", 7.5}};
+  kept.registered->off = {{{1, 2, 3}, "tumour", 7.5, true, true}};
+  kept.calibrated->in_place_of_utc = "2026-11-22T08:00:00Z";
   ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
   const auto read = read_operation(scratch.path());
   ASSERT_TRUE(read) << read.error().what;
   EXPECT_EQ(read->registered->doubt, kept.registered->doubt);
-  EXPECT_EQ(read->registered->off_mm, kept.registered->off_mm);
+  ASSERT_EQ(read->registered->off.size(), 1U);
+  EXPECT_EQ(read->registered->off[0].in_ct_mm, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(read->registered->off[0].name, "tumour");
+  EXPECT_EQ(read->registered->off[0].off_mm, 7.5);
+  EXPECT_TRUE(read->registered->off[0].deformed && read->registered->off[0].refuses);
+  EXPECT_EQ(read->calibrated->in_place_of_utc, kept.calibrated->in_place_of_utc);
   EXPECT_EQ(read->deformed->target_at_rest_mm, Eigen::Vector3d(1, 2, 3));
   EXPECT_TRUE(check_target(*read, {1, 2, 3.4}));
   const auto other = check_target(*read, {80, 80, 80});
@@ -112,6 +118,8 @@ TEST(Operation, OfAScopeWithARodTheAngleIsMissing) {
   const auto read = read_operation(scratch.path());
   ASSERT_TRUE(read) << read.error().what;
   EXPECT_TRUE(read->calibrated->scope.figures().rod_angle_missing);
+  ASSERT_TRUE(write_operation(scratch.path(), *read, *testing::authors().machine));
+  EXPECT_TRUE(read_operation(scratch.path())->calibrated->scope.figures().rod_angle_missing) << "written again";
 }
 
 /// The names of the part that a place of the text lies in; of a comma or an end of line, of the two about it.
