@@ -1,8 +1,9 @@
 #include "drivers/system/part_file.hpp"
 
 #include <fmt/format.h>
-#include <stdlib.h>
+#include <sys/stat.h>
 
+#include <cerrno>
 #include <string>
 #include <system_error>
 
@@ -12,14 +13,31 @@ namespace birdseye {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Who may read the former file, if there is one, and no others may read the new one.
+Result<void> keep_mode(const fs::path& written, const fs::path& place) {
+  struct stat former = {}, now = {};
+  if (::stat(place.c_str(), &former) != 0 || ::stat(written.c_str(), &now) != 0) return {};
+  const mode_t mode = former.st_mode & 0777;
+  if ((now.st_mode & 0777) == mode || ::chmod(written.c_str(), mode) == 0) return {};
+  return Error{Errc::unreadable,
+               fmt::format("{}: its permissions cannot be kept; write to another place", place.string())};
+}
+
+}  // namespace
+
 Result<PartFile> PartFile::make(const fs::path& place) {
   std::error_code ignored;
   if (fs::is_directory(place, ignored) || !place.has_filename())
     return Error{Errc::unreadable, fmt::format("{}: is a folder; give a file", place.string())};
   if (fs::is_other(place, ignored))
     return Error{Errc::unreadable, fmt::format("{}: is a pipe or a device; give a file", place.string())};
-  std::string folder = (place.parent_path() / "part-XXXXXX").string();
-  if (::mkdtemp(folder.data()) != nullptr) return PartFile(place, folder);
+  errno = EEXIST;
+  for (int n = 0; errno == EEXIST; ++n) {
+    const fs::path folder = place.parent_path() / fmt::format("part-{}", n);
+    if (::mkdir(folder.c_str(), 0700) == 0) return PartFile(place, folder);
+  }
   return Error{Errc::unreadable,
                fmt::format("{}: cannot be written; check the folder and its permissions, and whether the disk is full",
                            place.string())};
@@ -43,6 +61,7 @@ void PartFile::remove() {
 
 Result<void> PartFile::put_durably() {
   if (auto synced = sync_file(path()); !synced) return synced;
+  if (auto kept = keep_mode(path(), place_); !kept) return kept;
   std::error_code error;
   fs::rename(path(), place_, error);
   if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be replaced", place_.string())};

@@ -22,7 +22,8 @@ class PartFile {
   [[nodiscard]] std::filesystem::path path() const { return folder_ / place_.filename(); }
   /// For whatever else belongs to it until it is whole.
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
-  /// Puts what was written into its place: after a power cut there is the former file or the whole new one.
+  /// Puts what was written into its place: after a power cut there is the former file or the whole new one,
+  /// which has the permissions of the former.
   Result<void> put_durably();
 
  private:

@@ -9,6 +9,7 @@
 #include "calibration/base/lower_case.hpp"
 #include "drivers/system/program.hpp"
 #include "host/files/write_files.hpp"
+#include "host/recording/recording_writer.hpp"
 
 namespace birdseye::host {
 
@@ -52,8 +53,7 @@ bool is_folder(const fs::path& path) {
 
 /// Two of the command's files may not be one. A device or a pipe takes the texts of both.
 void check_against_output(const CLI::Option& out, const std::string& path, const CLI::Option& other) {
-  std::error_code ignored;
-  if (fs::is_other(path, ignored) || is_folder(path)) return;
+  if (stays(path) || is_folder(path)) return;
   for (const std::string& given : other.results()) {
     if (!given.empty() && same_file(given, path))
       throw CLI::ValidationError(out.get_name(),
@@ -63,7 +63,7 @@ void check_against_output(const CLI::Option& out, const std::string& path, const
 
 void check_against_input(const CLI::Option& out, const std::string& path, const CLI::Option& in) {
   std::error_code ignored;
-  if (!fs::is_regular_file(path, ignored)) return;
+  if (stays(path) || !fs::is_regular_file(path, ignored)) return;
   for (const std::string& given : in.results()) {
     if (fs::equivalent(given, path, ignored)) {
       throw CLI::ValidationError(
@@ -72,10 +72,21 @@ void check_against_input(const CLI::Option& out, const std::string& path, const 
   }
 }
 
-/// A file that is there and lies in a folder that is read.
+/// Whether a reader of the folder would take it: those of pictures, slices, and poses pass over what commands write
+/// beside them. A folder that a command of ours wrote, or a window, is read with all that it holds.
+bool is_taken_from(const CLI::Option& in, const fs::path& file) {
+  constexpr std::array kOfOurs{"recording", "folder",  "--recording", "--operation",
+                               "--path",    "--views", "--live-log",  "--resume"};
+  constexpr std::array kPassedOver{".json", ".html", ".yaml", ".yml", ".csv", ".svg"};
+  return file.filename() == kRecordingSheet ||
+         std::ranges::any_of(kOfOurs, [&in](const char* name) { return in.check_name(name); }) ||
+         std::ranges::count(kPassedOver, lower_case(file.extension().string())) == 0;
+}
+
+/// A file that is there, lies in a folder that is read, and is read with it.
 void check_against_folder(const CLI::Option& out, const std::string& path, const CLI::Option& in) {
   std::error_code ignored;
-  if (!fs::is_regular_file(path, ignored)) return;
+  if (stays(path) || !fs::is_regular_file(path, ignored) || !is_taken_from(in, path)) return;
   for (const std::string& given : in.results()) {
     if (is_folder(given) && fs::equivalent(fs::absolute(path, ignored).parent_path(), given, ignored)) {
       throw CLI::ValidationError(out.get_name(), path + " lies in the folder that is read, by " + in.get_name() +

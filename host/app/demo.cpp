@@ -113,6 +113,38 @@ ResultFolder folder_of(const DemoOptions& options) {
           "overlay_error_px_p50"};
 }
 
+/// Whether path is the folder or lies in it; both are there.
+bool is_within(const fs::path& path, const fs::path& folder) {
+  std::error_code error;
+  const fs::path place = fs::canonical(path, error);
+  if (error) return false;
+  const fs::path base = fs::canonical(folder, error);
+  return !error && std::ranges::mismatch(base, place).in1 == base.end();
+}
+
+/// The simulator replaces what lies in the folder's phantom/ and truth/: nothing there may be read, nor be anybody's
+/// own.
+Result<void> check_inner_folders(const ResultFolder& folder, const std::vector<fs::path>& inputs) {
+  for (const char* const name : {"phantom", "truth"}) {
+    const fs::path inner = folder.path / name;
+    std::error_code error;
+    const bool is_empty = fs::is_empty(inner, error);
+    if (error || is_empty) continue;
+    for (const fs::path& input : inputs) {
+      if (!input.empty() && is_within(input, inner)) {
+        return Error{Errc::bad_value,
+                     fmt::format("{}: is read, and would be written over by demo; give another --out", input.string())};
+      }
+    }
+    if (!is_of_earlier_run(folder)) {
+      return Error{Errc::bad_value, fmt::format("{}: is there, and not of an earlier demo; give another --out, or move "
+                                                "the folder away",
+                                                inner.string())};
+    }
+  }
+  return {};
+}
+
 /// Adds to the report which files the demo wrote: the next one may replace these, and no others.
 Result<void> list_files(const ResultFolder& folder) {
   auto report = read_json_file(folder.path / folder.sheet);
@@ -142,6 +174,7 @@ Result<ExitCode> demo(const DemoOptions& options) {
   const fs::path& out = settings.folder;
   const std::vector<fs::path> inputs{options.ct.path, settings.faults};
   if (auto is_free = check_free(folder_of(options), inputs); !is_free) return is_free.error();
+  if (auto is_free = check_inner_folders(folder_of(options), inputs); !is_free) return is_free.error();
   std::optional<ImportedVolume> ct;
   if (!options.ct.path.empty()) {
     // With the host's own checks: what would be stacked wrongly is refused here, with the reason.

@@ -200,7 +200,8 @@ Result<ExitCode> run(const ExportOptions& options) {
         "give what was registered: --registration of register fiducials, --views of register views, or both; or "
         "the --operation that a live window kept"};
   }
-  if (auto is_free = check_free(folder_of(options), inputs_of(options)); !is_free) return is_free.error();
+  if (auto is_free = check_free(folder_of(options), inputs_of(options), {options.json}); !is_free)
+    return is_free.error();
   const auto registered = read_registered(options);
   if (!registered) return registered.error();
   const auto map = map_of(options, *registered);

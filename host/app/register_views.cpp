@@ -269,7 +269,8 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
 ResultFolder folder_of(const RegisterViewsOptions& options) {
   return {options.out, "register views", "result.json",
           "field\\.mha|report\\.html|expected_error\\.png|trace\\.svg|pose\\.txt|"
-          "view[0-9]+((_difference)?_(before|after)|_outlines)\\.png"};
+          "view[0-9]+((_difference)?_(before|after)|_outlines)\\.png",
+          "reasons"};
 }
 
 /// The organ is not in the pictures where it should be: that is a verdict too.
@@ -285,7 +286,7 @@ Result<ExitCode> write_nothing_found(const RegisterViewsOptions& options, const 
 
 Result<ExitCode> run(const RegisterViewsOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
-  if (auto is_free = check_free(folder_of(options), {options.file}); !is_free) return is_free.error();
+  if (auto is_free = check_free(folder_of(options), {options.file}, {options.json}); !is_free) return is_free.error();
   auto read = read_case(options.file);
   if (!read) return read.error();
   const RegistrationCase& c = *read;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/interrupt.hpp"
 #include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
@@ -240,6 +241,7 @@ Result<void> write_still(const RenderOptions& options, const RenderScene& scene,
   const std::string png =
       options.over.empty() ? transparent_png_of(image) : png_of(RgbView{painted.rgb, image.width_px, image.height_px});
   if (!options.movie.empty()) {
+    note_interrupts();  // so that the half film is removed
     if (auto filmed = film_scene(options.movie, scene, engine); !filmed) return filmed;
   }
   if (auto written = write_files({{options.out, png}, {options.json, text_of(json)}}); !written) return written;

@@ -188,7 +188,8 @@ std::vector<fs::path> files_read(const ReplayOptions& options) {
 
 Result<ExitCode> run(ReplayOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
-  if (auto is_free = check_free(folder_of(options), files_read(options)); !is_free) return is_free.error();
+  if (auto is_free = check_free(folder_of(options), files_read(options), {options.json}); !is_free)
+    return is_free.error();
   auto authors = Authors::of_this_machine(options.accept_unsigned);
   if (!authors) return authors.error();
   options.inputs.authors = *std::move(authors);

@@ -89,13 +89,14 @@ class DemoSession {
   void judge();
   Result<void> overlay(const wire::VideoFrame& frame);
 
+  std::optional<ScopeSetup> scope_;
+  GuidedStations seen_;
+  VideoWatch video_;
   SimulatedCart& cart_;
   std::shared_ptr<const PatientPlan> patient_;  ///< all that the appliance does not send
   Film film_;
   Progress& progress_;
   LiveStations stations_;
-  GuidedStations seen_;
-  bool calibrating_begun_ = false;
   Background<Result<GuidedCalibration>> calibrating_;  ///< while the pointer touches
   PointerTip pointer_;
   std::vector<Eigen::Vector3d> touches_in_tracker_mm_;
@@ -106,10 +107,8 @@ class DemoSession {
   std::optional<double> deforming_took_s_;
   /// To be drawn once the deformation is known, and what tells meanwhile whether it may be.
   std::vector<std::variant<wire::VideoFrame, wire::Birds, wire::Health>> waiting_;
-  std::optional<ScopeSetup> scope_;
   ConnectedInstruments instruments_;
-  Instruments found_with_;  ///< that the scope was calibrated and the patient registered with
-  VideoWatch video_;
+  Instruments found_with_;    ///< that the scope was calibrated and the patient registered with
   std::string why_no_setup_;  ///< empty while the instruments are those that it was found with
   std::unique_ptr<Engine> engine_;
   FramePainter painter_;
@@ -117,6 +116,7 @@ class DemoSession {
   std::optional<std::uint64_t> first_sequence_;
   std::optional<DeviceTime> last_measured_;
   std::vector<double> tracker_periods_s_;
+  bool calibrating_begun_ = false;
 };
 
 }  // namespace birdseye::host

@@ -97,12 +97,35 @@ std::string twice_in(const cv::FileNode& map, int deeper = 1) {
   return {};
 }
 
+/// Without what follows # in a line of YAML, where it is not in quotes; of XML and JSON, all.
+std::string without_comments(const std::string& text) {
+  if (text.substr(0, 16).find("%YAML") == std::string::npos) return text;
+  std::string out;
+  bool quoted = false, comment = false;
+  for (const char c : text) {
+    if (c == '\n') quoted = comment = false;
+    if (c == '"' && !comment) quoted = !quoted;
+    if (c == '#' && !quoted) comment = true;
+    if (!comment) out += c;
+  }
+  return out;
+}
+
 /// A picture's width or height that begins with 0, which OpenCV counts by eights. Empty where there is none.
-std::string octal_size(const std::string& text) {
-  constexpr std::string_view kDigits = "0123456789";
+std::string octal_size(const std::string& file) {
+  constexpr std::string_view kDigits = "0123456789", kBeforeKey = "\n\"<{,-", kAfterKey = ":>";
+  constexpr const char* kBeforeNumber = " \t\r\n\":>+-";
+  const std::string text = without_comments(file);
   for (const std::string_view key : {"image_width", "image_height"}) {
     for (auto at = text.find(key); at != std::string::npos; at = text.find(key, at + 1)) {
-      const auto from = std::min(text.find_first_not_of(" \t\r\n\":>+-", at + key.size()), text.size());
+      const auto before = at == 0 ? std::string::npos : text.find_last_not_of(" \t\r", at - 1);
+      if (before != std::string::npos && kBeforeKey.find(text[before]) == std::string_view::npos) continue;
+      const auto told = text.find_first_not_of(" \t\r\n\"", at + key.size());
+      if (told == std::string::npos || kAfterKey.find(text[told]) == std::string_view::npos) continue;
+      auto from = text.find_first_not_of(kBeforeNumber, told);
+      if (from != std::string::npos && text[from] == '!')  // a tag, as !!int
+        from = text.find_first_not_of(kBeforeNumber, text.find_first_of(" \t\r\n", from));
+      from = std::min(from, text.size());
       const auto end = std::min(text.find_first_not_of(kDigits, from), text.size());
       if (end - from > 1 && text[from] == '0') return text.substr(from, end - from);
     }

@@ -19,6 +19,11 @@ namespace fs = std::filesystem;
 
 constexpr const char* kUnended = "did_not_end";
 
+/// By its key, or as one that did not end.
+bool is_sheet_of(const ResultFolder& folder, const nlohmann::json& sheet) {
+  return sheet.contains("verdict") && (sheet.contains(kUnended) || (!folder.key.empty() && sheet.contains(folder.key)));
+}
+
 /// What in the folder is of an earlier run by its sheet: a list of names, or an object by name.
 std::vector<std::string> written_before(const ResultFolder& folder) {
   const auto sheet = read_json_file(folder.path / folder.sheet);
@@ -34,9 +39,27 @@ std::vector<std::string> written_before(const ResultFolder& folder) {
     return written;
   }
   // Where it began, none of its names was taken.
-  if (!sheet->contains(kUnended) && (folder.key.empty() || !sheet->contains(folder.key))) return {};
+  if (!is_sheet_of(folder, *sheet)) return {};
   for (std::string& name : files_of(folder)) written.push_back(std::move(name));
   return written;
+}
+
+/// What the command writes besides may not be one of the folder's own files.
+Result<void> check_besides(const ResultFolder& folder, const std::vector<fs::path>& outputs) {
+  const std::regex of_it(folder.names);
+  for (const fs::path& output : outputs) {
+    if (output.empty()) continue;
+    std::error_code ignored;
+    if (fs::is_directory(output, ignored))
+      return Error{Errc::bad_value, fmt::format("{}: is a folder; give a file", output.string())};
+    const std::string name = output.filename().string();
+    if ((name == folder.sheet || std::regex_match(name, of_it)) && same_file(output, folder.path / name)) {
+      return Error{Errc::bad_value, fmt::format("{}: the folder of {} holds this file by itself; give --json another "
+                                                "name",
+                                                output.string(), folder.command)};
+    }
+  }
+  return {};
 }
 
 /// All in the folder that has one of its names, the sheet, too.
@@ -49,7 +72,9 @@ std::vector<std::string> taken_names(const ResultFolder& folder) {
 
 }  // namespace
 
-Result<void> check_free(const ResultFolder& folder, const std::vector<fs::path>& inputs) {
+Result<void> check_free(const ResultFolder& folder, const std::vector<fs::path>& inputs,
+                        const std::vector<fs::path>& outputs) {
+  if (auto besides = check_besides(folder, outputs); !besides) return besides;
   const std::vector<std::string> written = written_before(folder);
   for (const std::string& name : taken_names(folder)) {
     const fs::path file = folder.path / name;
@@ -67,6 +92,11 @@ Result<void> check_free(const ResultFolder& folder, const std::vector<fs::path>&
     }
   }
   return {};
+}
+
+bool is_of_earlier_run(const ResultFolder& folder) {
+  const auto sheet = read_json_file(folder.path / folder.sheet);
+  return sheet && sheet->is_object() && is_sheet_of(folder, *sheet);
 }
 
 Result<std::vector<std::string>> make_empty(const ResultFolder& folder, const std::vector<fs::path>& inputs) {

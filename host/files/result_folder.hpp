@@ -21,8 +21,13 @@ struct ResultFolder {
 };
 
 /// Before the work. Refuses, naming the file and the remedy, where one of its names is taken in the folder: by a file
-/// that no earlier run wrote, or by one of inputs, which may be files, folders, or empty.
-Result<void> check_free(const ResultFolder& folder, const std::vector<std::filesystem::path>& inputs);
+/// that no earlier run wrote, by one of inputs, which may be files, folders, or empty, or by one of outputs: what the
+/// command writes besides, as with --json; empty paths are passed over.
+Result<void> check_free(const ResultFolder& folder, const std::vector<std::filesystem::path>& inputs,
+                        const std::vector<std::filesystem::path>& outputs = {});
+
+/// Whether its sheet is an earlier run's, also of one that did not end. For folders with a key.
+bool is_of_earlier_run(const ResultFolder& folder);
 
 /// Checks that, makes the folder, and removes what an earlier run wrote there, for nobody must take it for this one's.
 /// Until the command writes its own sheet there is one that says that the run did not end. Answers what was removed.

@@ -5,7 +5,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
 #include <charconv>
 #include <nlohmann/json.hpp>
@@ -47,12 +46,6 @@ fs::path system_link_of(fs::path path) {
     path = path.parent_path() / to;
   }
   return found;
-}
-
-/// Whether it is written to as it is, and not replaced.
-bool stays(const fs::path& path) {
-  std::error_code ignored;
-  return fs::is_other(path, ignored) || !system_link_of(path).empty();
 }
 
 /// What a path has open that names a descriptor of this program, as /dev/stdout does: so that what is written goes on
@@ -97,21 +90,28 @@ Result<void> put_as_it_is(const FileText& file) {
 /// Beside the file, in a file of its own by a name that nobody has: what lies there is left alone. It gets the mode of
 /// the file that it replaces. part: gets its path.
 Result<void> put_part(const FileText& file, fs::path& part) {
-  static std::atomic<unsigned> made{0};
   struct stat former {};
   const bool replaces = ::stat(file.path.c_str(), &former) == 0;
+  if (!replaces && errno == ENAMETOOLONG)
+    return Error{Errc::unreadable, fmt::format("{}: is too long a name; give a shorter one", file.path.string())};
   const mode_t mode = replaces ? former.st_mode & 0777U : 0666U;
   UniqueFd fd;
-  do {
-    part = fmt::format("{}.{}-{}.part", file.path.string(), ::getpid(), made++);
+  errno = EEXIST;
+  for (int n = 0; !fd && errno == EEXIST; ++n) {
+    part = file.path.parent_path() / fmt::format(".{}.part", n);
     fd = UniqueFd(::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
-  } while (!fd && errno == EEXIST);
+  }
   if (!fd) part.clear();
   if (fd && replaces && ::fchmod(fd.get(), mode) != 0) return cannot_be_written(file.path);
   return put(fd, file);
 }
 
 }  // namespace
+
+bool stays(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_other(path, ignored) || !system_link_of(path).empty();
+}
 
 bool same_file(const fs::path& a, const fs::path& b) {
   std::error_code ignored;

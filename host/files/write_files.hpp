@@ -21,6 +21,8 @@ struct FileText {
 /// are passed over. Two that are the same file are refused before anything is written.
 Result<void> write_files(const std::vector<FileText>& files);
 Result<void> write_file(const std::filesystem::path& path, const std::string& text);
+/// Whether write_files() writes to it as it is, and does not replace it: a device, a pipe, or a link in /dev or /proc.
+bool stays(const std::filesystem::path& path);
 /// Whether two paths name the same file, or would if it were there, whichever way they are spelled.
 bool same_file(const std::filesystem::path& a, const std::filesystem::path& b);
 /// Indented, with a final newline.

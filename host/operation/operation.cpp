@@ -5,6 +5,8 @@
 
 #include <array>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
 
 #include "drivers/system/durable.hpp"
 #include "drivers/system/json_file.hpp"
@@ -82,16 +84,18 @@ std::array<Copy, 4> copies_of(const Operation& operation) {
            {kField, "deformed", operation.deformed != nullptr}}};
 }
 
-/// The operation that the folder holds so far; empty where it holds none that can be read.
-nlohmann::json former_sheet(const fs::path& folder) {
+/// Of the operation that the folder holds so far; empty where it holds none that can be read.
+std::set<std::string> former_parts(const fs::path& folder) {
+  std::set<std::string> parts;
   const auto text = read_whole_file(folder / kSheet, kMostSheet_bytes);
-  if (!text) return nlohmann::json::object();
-  auto sheet = unseal(*text);
-  return sheet ? *std::move(sheet) : nlohmann::json::object();
+  const auto sheet = text ? unseal(*text) : text.error();
+  if (!sheet) return parts;
+  for (const auto& [part, value] : sheet->items()) parts.insert(part);
+  return parts;
 }
 
 /// A file by a copy's name that the former operation did not write is somebody's own.
-Result<void> check_copies(const fs::path& folder, const Operation& operation, const nlohmann::json& former) {
+Result<void> check_copies(const fs::path& folder, const Operation& operation, const std::set<std::string>& former) {
   for (const Copy& copy : copies_of(operation)) {
     std::error_code ignored;
     if (!copy.written || former.contains(copy.part)) continue;
@@ -105,7 +109,7 @@ Result<void> check_copies(const fs::path& folder, const Operation& operation, co
 
 /// A copy of what is no more in the operation is taken away: it would be taken for the present. For good before the
 /// operation is written, for after a power cut a copy that is back would be taken for somebody's own.
-Result<void> remove_copies(const fs::path& folder, const Operation& operation, const nlohmann::json& former) {
+Result<void> remove_copies(const fs::path& folder, const Operation& operation, const std::set<std::string>& former) {
   bool removed = false;
   for (const Copy& copy : copies_of(operation)) {
     std::error_code ignored;
@@ -168,7 +172,7 @@ Result<Operation> operation_of(const nlohmann::json& sheet) {
 }  // namespace
 
 Result<void> write_operation(const fs::path& folder, const Operation& operation, const ThisMachine& machine) {
-  const nlohmann::json former = former_sheet(folder);
+  const std::set<std::string> former = former_parts(folder);
   if (auto checked = check_copies(folder, operation, former); !checked) return checked;
   // While the former operation still tells that they are its own.
   if (auto removed = remove_copies(folder, operation, former); !removed) return removed;

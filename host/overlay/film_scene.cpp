@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "calibration/geometry/camera_path.hpp"
+#include "drivers/system/interrupt.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/files/film.hpp"
 #include "host/overlay/render_scene.hpp"
@@ -21,6 +22,7 @@ Result<void> film_scene(const std::filesystem::path& path, const RenderScene& sc
   look.render = scene.settings;
   Progress progress;
   for (int frame = 0; frame < frames; ++frame) {
+    if (interrupted()) return Error{Errc::disconnected, "interrupted; no film is written"};
     if (frame % 10 == 0) progress(fmt::format("frame {} of {}", frame, frames));
     const double phase = 2 * std::numbers::pi * frame / frames;
     Transform<Camera, Patient> camera_from_patient = scene.camera_from_patient;

@@ -86,9 +86,24 @@ void LocalDisk::note(const fs::path& path) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) {
     synced_names_[path] = names_in(path);
+    forget_removed();
   } else {
     synced_text_[hold(path)] = text_in(path);
   }
+}
+
+/// What no name leads to any more, neither one that was synced nor one that is there now, is nobody's.
+void LocalDisk::forget_removed() {
+  std::set<std::uint64_t> named;
+  for (const auto& [folder, names] : synced_names_)
+    for (const auto& [name, node] : names) named.insert(node.number);
+  std::error_code ignored;
+  for (const auto& entry : fs::recursive_directory_iterator(root_, ignored)) named.insert(number_of(entry.path()));
+  std::erase_if(synced_text_, [&](const auto& file) {
+    if (named.contains(file.first)) return false;
+    fs::remove(held(file.first), ignored);
+    return true;
+  });
 }
 
 void LocalDisk::note_all() {

@@ -55,6 +55,7 @@ class LocalDisk final : public DiskKeeper {
   void wait_for_disk() const;
   void note(const std::filesystem::path& path);
   void note_all();
+  void forget_removed();
   [[nodiscard]] Names names_in(const std::filesystem::path& folder);
   [[nodiscard]] std::filesystem::path held(std::uint64_t number) const;
   std::uint64_t hold(const std::filesystem::path& file);

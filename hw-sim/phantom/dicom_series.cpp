@@ -8,6 +8,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <fstream>
 #include <numbers>
 #include <string>
 #include <system_error>
@@ -20,22 +21,51 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// 2.25 is for identifiers made of a number of one's own (ITU-T X.667).
+constexpr const char* kUidRoot = "2.25.7711";
+
 std::string name_of_slice(int number) {
   return fmt::format("{:04}.dcm", number);
+}
+
+bool has_name_of_slice(const fs::path& path) {
+  const std::string name = path.filename().string();
+  int number = 0;
+  const auto [end, fault] = std::from_chars(name.data(), name.data() + name.size(), number);
+  return fault == std::errc() && name == name_of_slice(number);
 }
 
 /// Files with other names may be anybody's.
 void remove_slices(const fs::path& folder, std::error_code& error) {
   for (fs::directory_iterator at(folder, error); !error && at != fs::directory_iterator(); at.increment(error)) {
-    const std::string name = at->path().filename().string();
-    int number = 0;
-    const auto [end, fault] = std::from_chars(name.data(), name.data() + name.size(), number);
-    if (fault == std::errc() && name == name_of_slice(number)) fs::remove(at->path(), error);
+    if (has_name_of_slice(at->path())) fs::remove(at->path(), error);
     if (error) return;
   }
 }
 
+/// By its name, and by the identifiers that its head has. An empty one is where the writing was cut off.
+bool is_slice_of_ours(const fs::directory_entry& file) {
+  std::error_code ignored;
+  if (!has_name_of_slice(file.path()) || file.is_symlink(ignored) || !file.is_regular_file(ignored)) return false;
+  constexpr std::size_t kPreamble = 128;
+  std::string head(4096, '\0');
+  std::ifstream in(file.path(), std::ios::binary);
+  if (!in) return false;
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  if (head.empty()) return true;
+  return head.size() > kPreamble && head.compare(kPreamble, 4, "DICM") == 0 && head.find(kUidRoot) != std::string::npos;
+}
+
 }  // namespace
+
+bool only_slices_of_ours(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error); !error && at != fs::directory_iterator(); at.increment(error)) {
+    if (!is_slice_of_ours(*at)) return false;
+  }
+  return !error;
+}
 
 Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid& grid, std::span<const std::int16_t> hu,
                                 std::uint64_t seed, double gantry_tilt_deg) {
@@ -48,8 +78,7 @@ Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid&
                  fmt::format("{}: the former series cannot be removed; choose another --out", folder.string())};
   }
   using Slice = itk::Image<std::int16_t, 3>;
-  // The root 2.25 is for identifiers made of a number of one's own (ITU-T X.667).
-  const std::string study = fmt::format("2.25.7711{}", seed);
+  const std::string study = fmt::format("{}{}", kUidRoot, seed);
   try {
     for (int k = 0; k < grid.size[2]; ++k) {
       Grid one = grid;

@@ -15,4 +15,7 @@ namespace birdseye::hw_sim {
 Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid& grid, std::span<const std::int16_t> hu,
                                 std::uint64_t seed, double gantry_tilt_deg = 0);
 
+/// Whether all that is in folder are slices that write_dicom_series() wrote, the last of them perhaps not to its end.
+bool only_slices_of_ours(const std::filesystem::path& folder);
+
 }  // namespace birdseye::hw_sim

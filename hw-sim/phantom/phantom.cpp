@@ -74,12 +74,14 @@ Result<void> write_surfaces(const std::filesystem::path& folder, const Body& bod
   return {};
 }
 
-/// A series that no phantom is of may be a patient's.
+/// A series that no phantom is of may be a patient's. One that was interrupted has no truth.json yet.
 Result<void> check_series(const std::filesystem::path& folder) {
   const std::filesystem::path series = folder / "ct";
   std::error_code error;
   const std::filesystem::directory_iterator first(series, error);
-  if (error || first == std::filesystem::directory_iterator() || read_phantom_truth(folder)) return {};
+  if (error || first == std::filesystem::directory_iterator() || read_phantom_truth(folder) ||
+      only_slices_of_ours(series))
+    return {};
   return Error{Errc::bad_value,
                fmt::format("{}: is not empty, and no truth.json of a phantom is beside it; choose another --out",
                            series.string())};

@@ -18,7 +18,8 @@ struct PhantomSettings {
 };
 
 /// Writes folder/ct (DICOM series), folder/segmentation.nii.gz, folder/surfaces/*.ply and folder/truth.json. The same
-/// settings give the same bytes. A folder/ct that is not empty is refused, but where a phantom was written before.
+/// settings give the same bytes. A folder/ct that is not empty is refused, but where a phantom was written before, or
+/// the beginning of one.
 Result<void> write_phantom(const PhantomSettings& settings);
 
 /// What folder/truth.json says, patient LPS mm.

@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <optional>
+#include <string>
 
 #include "tests/support/scratch.hpp"
 #include "tests/support/synced_files.hpp"
@@ -38,6 +39,23 @@ TEST(PartFile, ComesIntoItsPlaceWholeAndOnTheDisk) {
   EXPECT_TRUE(is_synced(scratch.path()));
   EXPECT_EQ(contents_of(place), "the new one");
   EXPECT_EQ(files_in(scratch.path()), 1) << "its folder is gone before it is";
+}
+
+TEST(PartFile, HasThePermissionsOfTheFormerFile) {
+  const Scratch scratch;
+  for (const mode_t mode : {0600U, 0640U, 0444U}) {
+    const fs::path place = scratch.file(std::to_string(mode) + ".nrrd", "the former");
+    ASSERT_EQ(::chmod(place.c_str(), mode), 0);
+    auto part = PartFile::make(place);
+    ASSERT_TRUE(part) << part.error().what;
+    std::ofstream(part->path()) << "the new one";
+    const auto put = part->put_durably();
+    ASSERT_TRUE(put) << put.error().what;
+    EXPECT_EQ(contents_of(place), "the new one");
+    struct stat now = {};
+    ASSERT_EQ(::stat(place.c_str(), &now), 0);
+    EXPECT_EQ(now.st_mode & 0777, mode);
+  }
 }
 
 TEST(PartFile, NothingIsLeftOfOneThatDoesNotGetThere) {

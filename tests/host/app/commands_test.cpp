@@ -344,26 +344,60 @@ TEST(Commands, WhatIsReadIsNotWrittenOver) {
   const Scratch scratch;
   fs::create_directory(scratch / "in");
   const std::string file = scratch.file("in/one.json", "{}"), folder = (scratch / "in").string();
+  const std::string slice = scratch.file("in/one.dcm", "{}");
   const std::string other = (scratch / "in/../in/one.json").string(), here = (scratch / "./in/new.json").string();
   const std::vector<std::string> over{"would be written over"}, twice{"is written by", "too"};
   expect_refused("birdseye", "render --volume ct --pose " + file + " --movie " + other, over);
   expect_refused("birdseye", "live --language " + file + " --list-texts " + other, over);
-  expect_refused("birdseye", "calibrate tip --poses " + folder + " --out " + file, over);
-  expect_refused("birdseye", "calibrate camera --board chessboard:14x10:3mm --images " + folder + " --out " + file,
+  expect_refused("birdseye", "calibrate tip --poses " + folder + " --out " + slice, over);
+  expect_refused("birdseye", "calibrate camera --board chessboard:14x10:3mm --images " + folder + " --out " + slice,
                  over);
-  expect_refused("birdseye", "volume markers " + folder + " --near 1,2,3 --out " + file, over);
-  expect_refused("birdseye", "volume info " + folder + " --json " + file, over);
-  expect_refused("birdseye", "doctor --ct " + folder + " --json " + file, over);
+  expect_refused("birdseye", "volume markers " + folder + " --near 1,2,3 --out " + slice, over);
+  expect_refused("birdseye", "volume info " + folder + " --json " + slice, over);
+  expect_refused("birdseye", "doctor --ct " + folder + " --json " + slice, over);
   expect_refused("birdseye",
                  "calibrate field check --plate p --measured m --history " + here + " --json " + folder + "/new.json",
                  twice);
+  expect_refused("birdseye", "export --views " + folder + " --out " + (scratch / "o").string() + " --json " + file,
+                 over);
   EXPECT_EQ(testing::contents_of(file), "{}");
+  EXPECT_EQ(testing::contents_of(slice), "{}");
   EXPECT_FALSE(fs::exists(here));
   // A new file may go where its inputs lie, and two texts into one device.
   const std::string points = scratch.file("in/points.txt", kFour);
   const std::string good =
       "register fiducials --ct " + points + " --tracker " + scratch.file("t.txt", "7 0 1\n107 0 1\n7 80 1\n17 20 61\n");
   EXPECT_EQ(run("birdseye", good + " --out " + here + " --json /dev/null --report /dev/null").code, 0);
+}
+
+/// What a command wrote into a folder that it reads, and no reader takes, is written anew by the next run.
+TEST(Commands, FiguresBesideWhatIsReadAreWrittenAgain) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "in");
+  const std::string folder = (scratch / "in").string(), figures = scratch.file("in/x.json", "{}");
+  const auto result = run("birdseye", "volume info " + folder + " --json " + figures);
+  EXPECT_EQ(result.output.find("would be written over"), std::string::npos) << result.output;
+}
+
+TEST(Commands, DemoLeavesFoldersOfTheUsersOwn) {
+  const Scratch scratch;
+  const std::string out = scratch.path().string();
+  for (const char* name : {"phantom", "truth"}) {
+    fs::create_directory(scratch / name);
+    const std::string own = scratch.file(std::string(name) + "/own.txt", "the user's own");
+    for (const char* sheet : {"", R"({"verdict": "pass"})"}) {
+      (void)scratch.file("report.json", sheet);
+      expect_refused("birdseye", "demo --out " + out, {"report.json", "not of an earlier demo", "give another --out"});
+    }
+    fs::remove(scratch / "report.json");
+    expect_refused("birdseye", "demo --out " + out, {name, "not of an earlier demo", "give another --out"});
+    (void)scratch.file("report.json", R"({"verdict": "fail", "did_not_end": true})");
+    expect_refused("birdseye", "demo --ct " + (scratch / name).string() + " --out " + out,
+                   {name, "is read", "give another --out"});
+    EXPECT_EQ(testing::contents_of(own), "the user's own");
+    fs::remove(scratch / "report.json");
+    fs::remove_all(scratch / name);
+  }
 }
 
 TEST(Commands, DemoRefusesACtThatIsNotThere) {

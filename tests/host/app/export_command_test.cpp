@@ -131,6 +131,18 @@ TEST(ExportCommand, ReplacesAnEarlierExportAndNothingElse) {
   EXPECT_FALSE(fs::exists(out / "ct.nrrd")) << "this export writes none";
 }
 
+TEST(ExportCommand, FiguresAreNotWrittenOverWhatTheFolderHolds) {
+  const Scratch scratch;
+  const std::string fiducials = scratch.file("f.txt", kPatientFromTracker);
+  const fs::path out = scratch / "out";
+  for (const char* name : {"ct.nrrd", "export.json"}) {
+    expect_refused("birdseye",
+                   "export --registration " + fiducials + " --out " + out.string() + " --json " + (out / name).string(),
+                   {name, "holds this file by itself", "give --json another name"});
+  }
+  EXPECT_FALSE(fs::exists(out));
+}
+
 TEST(ExportCommand, TheCtThatIsReadIsNotReplaced) {
   const Scratch scratch;
   const std::string fiducials = scratch.file("f.txt", kPatientFromTracker);

@@ -174,7 +174,7 @@ TEST(RegisterViewsCommand, FailsWhereNoViewSeesTheOrgan) {
   for (const char* name : {"field.mha", "report.html", "view0_after.png", "viewpoint_after.png"})
     std::ofstream(scratch / "out" / name) << "an earlier one's";
   std::ofstream(scratch / "out/result.json")
-      << R"({"verdict": "pass", "files": ["field.mha", "report.html", "view0_after.png"]})";
+      << R"({"verdict": "pass", "reasons": ["of a version that listed no files"]})";
   const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
   EXPECT_EQ(result.code, 3) << result.output;
   EXPECT_EQ(read_json(scratch / "r.json")["verdict"], "fail");
@@ -194,6 +194,8 @@ TEST(RegisterViewsCommand, FilesOfTheUsersOwnAreNotRemoved) {
     EXPECT_EQ(contents_of(own), "the user's own");
     fs::remove(own);
   }
+  expect_refused("birdseye", command + " --json " + (scratch / "report.html").string(),
+                 {"report.html", "holds this file by itself", "give --json another name"});
 }
 
 /// What a registration says of an organ that lies as in its CT. from and to: what of the case is changed, as changed()

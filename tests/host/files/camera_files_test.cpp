@@ -206,6 +206,21 @@ TEST(CameraFiles, AWholeNumberIsDecimal) {
   const auto opencv = read_lens_text(changed(camera_text(kLens), "image_width: 1920", "image_width: 01720"));
   ASSERT_FALSE(opencv);
   EXPECT_THAT(opencv.error().what, HasSubstr("lens.yaml: has a picture of 01720 px; write the number without the 0"));
+  const auto with_width = [](const std::string& line) {
+    return read_lens_text(changed(camera_text(kLens), "image_width: 1920", line));
+  };
+  for (const char* line : {"image_width: !!int 01720", "image_width : 01720", "image_width: # of the lens\n   01720"}) {
+    const auto octal = with_width(line);
+    ASSERT_FALSE(octal) << line;
+    EXPECT_THAT(octal.error().what, HasSubstr("has a picture of 01720 px")) << line;
+  }
+  for (const char* line : {"# image_width 01 is old\nimage_width: 1920", "   # image_width: 01\nimage_width: 1920",
+                           "image_width: 1920 # image_width: 01", "note: \"#1\"\nimage_width: !!int 1920",
+                           "old_image_width: 01\nimage_width: 1920"}) {
+    const auto sound = with_width(line);
+    ASSERT_TRUE(sound) << sound.error().what;
+    EXPECT_EQ(*sound, kLens) << line;
+  }
   const auto letters = read_lens_text(changed(kRos, "752", "752px"));
   ASSERT_FALSE(letters);
   EXPECT_THAT(letters.error().what, HasSubstr("a whole decimal number belongs there"));

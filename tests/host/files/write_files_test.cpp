@@ -43,6 +43,15 @@ TEST(WriteFiles, AFileOfTheUsersOwnNamedPartIsLeftAlone) {
   EXPECT_EQ(files_in(scratch), 2U);
 }
 
+TEST(WriteFiles, ALongNameIsWrittenAndATooLongOneRefusedAsSuch) {
+  const birdseye::testing::Scratch scratch;
+  EXPECT_TRUE(write_file(scratch / (std::string(245, 'a') + ".json"), "new"));
+  const auto too_long = write_file(scratch / (std::string(300, 'a') + ".json"), "new");
+  ASSERT_FALSE(too_long);
+  EXPECT_NE(too_long.error().what.find("is too long a name"), std::string::npos) << too_long.error().what;
+  EXPECT_EQ(files_in(scratch), 1U);
+}
+
 TEST(WriteFiles, TwoThatAreTheSameFileAreRefusedBeforeAnythingIsWritten) {
   const birdseye::testing::Scratch scratch;
   const std::filesystem::path folder = scratch.path();
@@ -147,6 +156,11 @@ TEST(ResultFolder, WhatNoEarlierRunListsIsRefused) {
   (void)scratch.file("a.txt", "an earlier run's");
   EXPECT_TRUE(check_free(folder, kNoInputs));
   EXPECT_FALSE(check_free(folder, {scratch.path() / "a.txt"})) << "it is read";
+  std::filesystem::create_directory(scratch / "b");
+  for (const char* const name : {"a.txt", "b/../p7.png", "export.json"})
+    EXPECT_FALSE(check_free(folder, kNoInputs, {scratch.path() / name})) << name;
+  for (const char* const name : {"figures.json", "b/a.txt"})
+    EXPECT_TRUE(check_free(folder, kNoInputs, {scratch.path() / name})) << name;
 }
 
 TEST(FilesSha256, AFileIsAsTheSheetBesideItSaysOrRefused) {

@@ -61,5 +61,28 @@ TEST(Phantom, ASeriesIsReplacedOnlyWhereItIsAPhantoms) {
   EXPECT_NE(told_of(scratch).find("none.nii.gz"), std::string::npos) << told_of(scratch);
 }
 
+TEST(Phantom, AHalfSeriesOfItsOwnIsReplaced) {
+  const Scratch scratch;
+  const fs::path ct = scratch / "ph/ct";
+  write_series(ct, 3);
+  std::ofstream(ct / "0004.dcm").flush();  // interrupted before its first bytes
+  EXPECT_NE(told_of(scratch).find("none.nii.gz"), std::string::npos) << told_of(scratch);
+
+  const std::string refused = ct.string() + ": is not empty";
+  const std::string ours = contents_of(ct / "0001.dcm");
+  std::string foreign = ours;
+  for (std::size_t at = 0; (at = foreign.find("2.25.7711")) != std::string::npos;) foreign.replace(at, 9, "1.2.84011");
+  ASSERT_NE(foreign, ours);
+  for (const std::string& text : {foreign, std::string("a patient's"), std::string(128, '\0') + "DICM"}) {
+    (void)scratch.file("ph/ct/0001.dcm", text);
+    EXPECT_NE(told_of(scratch).find(refused), std::string::npos) << told_of(scratch);
+    EXPECT_EQ(contents_of(ct / "0001.dcm"), text);
+  }
+  (void)scratch.file("ph/ct/0001.dcm", ours);
+  EXPECT_NE(told_of(scratch).find("none.nii.gz"), std::string::npos) << told_of(scratch);
+  (void)scratch.file("ph/ct/IM0001.dcm", ours);
+  EXPECT_NE(told_of(scratch).find(refused), std::string::npos) << "another's name";
+}
+
 }  // namespace
 }  // namespace birdseye::hw_sim
