@@ -71,18 +71,16 @@ void LiveWorkflow::take_up() {
   // The calibration that is in force may be newer, or nobody knows which one it was: a deformation then means nothing.
   const bool same_scope = kept->calibrated && calibration_.take_up(*kept->calibrated, when);
   const bool taken_up = fiducials_.take_up(kept->registered, when);
-  if (taken_up && kept->registered) off_.take_up(kept->registered->off);
   // The circle would be too small by what is not known.
   const bool is_known = kept->deformed && kept->deformed->target;
   if (taken_up && same_scope && is_known) {
     deformation_.take_up(kept->deformed, when);
     show_shape();
-    off_.take_up(kept->registered ? kept->registered->off : std::vector<PlaceOff>());  // of this very deformation
-    update_setup();
   } else if (kept->deformed) {
-    off_.forget_deformed();
     views_.forget(is_known ? words("note_calibrated_anew") : words("note_deformed_unknown"));
   }
+  if (taken_up && kept->registered) off_.take_up(kept->registered->off);
+  if (!deformation_.found()) off_.forget_deformed();
   judge_instruments();
   update_setup();
   keep();

@@ -332,14 +332,19 @@ TEST(LiveWorkflow, WhatIsTakenUpIsNotLostByTouchesThatWereHeldBack) {
   EXPECT_TRUE(read_operation(scratch.path())->registered);
 }
 
-TEST(LiveWorkflow, ADeformationThatWasJudgedByAnotherTargetIsNotTakenUpAndNotLost) {
-  const Scratch scratch;
+/// A registration, and an organ that was deformed with the scope of the appliance's record.
+void keep_deformed(const Scratch& scratch, const DeformedOrgan& organ) {
   Operation kept = registered_operation(resumed(scratch, scratch.path()));
-  kept.calibrated = birdseye::testing::calibrated_by(birdseye::testing::straight_scope_record());
-  auto organ = *birdseye::testing::moved_to_the_left();
-  organ.target_at_rest_mm = {80, 80, 80};
+  kept.calibrated = calibrated_by(birdseye::testing::straight_scope_record());
   kept.deformed = std::make_shared<const DeformedOrgan>(organ);
   ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+}
+
+TEST(LiveWorkflow, ADeformationThatWasJudgedByAnotherTargetIsNotTakenUpAndNotLost) {
+  const Scratch scratch;
+  DeformedOrgan organ = *moved_to_the_left();
+  organ.target_at_rest_mm = {80, 80, 80};
+  keep_deformed(scratch, organ);
   {
     LiveWorkflow workflow(resumed(scratch, scratch.path()));
     connect(workflow);
@@ -352,12 +357,9 @@ TEST(LiveWorkflow, ADeformationThatWasJudgedByAnotherTargetIsNotTakenUpAndNotLos
 
 TEST(LiveWorkflow, ADeformationOfWhoseTargetNothingIsKnownIsNotTakenUp) {
   const Scratch scratch;
-  Operation kept = registered_operation(resumed(scratch, scratch.path()));
-  kept.calibrated = birdseye::testing::calibrated_by(birdseye::testing::straight_scope_record());
-  auto organ = *birdseye::testing::moved_to_the_left();
+  DeformedOrgan organ = *moved_to_the_left();
   organ.target.reset();
-  kept.deformed = std::make_shared<const DeformedOrgan>(organ);
-  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  keep_deformed(scratch, organ);
   LiveWorkflow workflow(resumed(scratch, scratch.path()));
   connect(workflow);
   load(workflow);
