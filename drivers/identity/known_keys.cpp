@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <fstream>
 #include <sstream>
 #include <string_view>
 #include <system_error>
@@ -12,6 +11,7 @@
 
 #include "drivers/identity/identity_folder.hpp"
 #include "drivers/system/durable.hpp"
+#include "drivers/system/part_file.hpp"
 #include "drivers/system/whole_file.hpp"
 
 namespace birdseye {
@@ -114,16 +114,8 @@ Result<void> KnownKeys::add(const std::string& name, const PublicKey& key) {
   }
   if (!text.empty() && text.back() != '\n') text += '\n';
   text += fmt::format("{} {}\n", name, key.hex());
-  const fs::path part = file_.string() + ".part";
-  std::ofstream out(part, std::ios::binary | std::ios::trunc);
-  out << text;
-  out.close();
-  std::error_code failed;
-  fs::permissions(part, fs::perms::owner_read | fs::perms::owner_write, failed);  // whatever new files are given
-  if (!out || failed)
-    return Error{Errc::unreadable,
-                 fmt::format("{}: cannot be written; check the folder and its permissions", file_.string())};
-  if (auto placed = replace_durably(part, file_); !placed) return placed;
+  if (auto written = write_durably(file_, text, fs::perms::owner_read | fs::perms::owner_write); !written)
+    return written;
   machines_.push_back(machine);
   return {};
 }

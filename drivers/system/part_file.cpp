@@ -4,7 +4,7 @@
 #include <sys/stat.h>
 
 #include <cerrno>
-#include <string>
+#include <fstream>
 #include <system_error>
 
 #include "drivers/system/durable.hpp"
@@ -25,7 +25,22 @@ Result<void> keep_mode(const fs::path& written, const fs::path& place) {
                fmt::format("{}: its permissions cannot be kept; write to another place", place.string())};
 }
 
+Error cannot_be_written(const fs::path& place) {
+  return {Errc::unreadable,
+          fmt::format("{}: cannot be written; check the folder and its permissions, and whether the disk is full",
+                      place.string())};
+}
+
 }  // namespace
+
+fs::path take_part_name(const fs::path& place, const std::function<bool(const fs::path&)>& take) {
+  for (int n = 0;; ++n) {
+    fs::path part = place.parent_path() / fmt::format(".{}.part", n);
+    errno = 0;
+    if (take(part)) return part;
+    if (errno != EEXIST) return {};
+  }
+}
 
 Result<PartFile> PartFile::make(const fs::path& place) {
   std::error_code ignored;
@@ -33,14 +48,9 @@ Result<PartFile> PartFile::make(const fs::path& place) {
     return Error{Errc::unreadable, fmt::format("{}: is a folder; give a file", place.string())};
   if (fs::is_other(place, ignored))
     return Error{Errc::unreadable, fmt::format("{}: is a pipe or a device; give a file", place.string())};
-  errno = EEXIST;
-  for (int n = 0; errno == EEXIST; ++n) {
-    const fs::path folder = place.parent_path() / fmt::format("part-{}", n);
-    if (::mkdir(folder.c_str(), 0700) == 0) return PartFile(place, folder);
-  }
-  return Error{Errc::unreadable,
-               fmt::format("{}: cannot be written; check the folder and its permissions, and whether the disk is full",
-                           place.string())};
+  fs::path folder = take_part_name(place, [](const fs::path& name) { return ::mkdir(name.c_str(), 0700) == 0; });
+  if (folder.empty()) return cannot_be_written(place);
+  return PartFile(place, std::move(folder));
 }
 
 PartFile& PartFile::operator=(PartFile&& other) noexcept {
@@ -67,6 +77,18 @@ Result<void> PartFile::put_durably() {
   if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be replaced", place_.string())};
   remove();  // before the names in the folder are brought onto the disk
   return sync_folder(place_.parent_path());
+}
+
+Result<void> write_durably(const fs::path& place, std::string_view text, fs::perms of_new) {
+  auto part = PartFile::make(place);
+  if (!part) return part.error();
+  std::ofstream out(part->path(), std::ios::binary);
+  out << text;
+  out.close();
+  std::error_code failed;
+  if (of_new != fs::perms::unknown) fs::permissions(part->path(), of_new, failed);
+  if (!out || failed) return cannot_be_written(place);
+  return part->put_durably();
 }
 
 }  // namespace birdseye

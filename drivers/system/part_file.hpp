@@ -1,11 +1,19 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <string_view>
 #include <utility>
 
 #include "calibration/base/result.hpp"
 
 namespace birdseye {
+
+/// A name beside a place, in the place's folder, that nobody has. `take` tries to have a name, and answers whether it
+/// does; where it does not by EEXIST, the next name is tried. They are counted from 0, so that what is simulated has
+/// the same names each time. Empty where none could be had: errno says why.
+std::filesystem::path take_part_name(const std::filesystem::path& place,
+                                     const std::function<bool(const std::filesystem::path&)>& take);
 
 /// A file until it is whole: under the name that it will have, so that who writes it finds the format by the ending,
 /// in a fresh folder beside its place, where nobody else's file is in the way. What is left of it goes away with this.
@@ -33,5 +41,10 @@ class PartFile {
 
   std::filesystem::path place_, folder_;
 };
+
+/// Writes a text as such a file. of_new: the permissions of one that was not there; unknown: as the user's new files
+/// have them.
+Result<void> write_durably(const std::filesystem::path& place, std::string_view text,
+                           std::filesystem::perms of_new = std::filesystem::perms::unknown);
 
 }  // namespace birdseye

@@ -196,15 +196,7 @@ Result<ExitCode> table_of_lines(const BenchRegisterOptions& options) {
   return code_of(rows);
 }
 
-Result<void> make_folder(const char* option, const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (!error) return {};
-  return Error{Errc::unreadable, fmt::format("{} {}: cannot be made; choose another folder", option, folder.string())};
-}
-
 Result<void> study(const BenchRegisterOptions& options) {
-  if (auto made = make_folder("--study", options.study); !made) return made;
   constexpr int kQuick = 2;
   const int trials = options.trials.value_or(StudyOptions{}.trials);
   return register_study({options.study, options.quick ? kQuick : trials, options.sweeps, options.simulated});
@@ -214,7 +206,12 @@ Result<void> factors(const BenchRegisterOptions& options) {
   FactorOptions of = options.factors;
   of.trials = options.trials.value_or(of.trials);
   of.size = options.simulated.size;
-  if (auto made = make_folder("--factors", of.folder); !made) return made;
+  std::error_code error;
+  std::filesystem::create_directories(of.folder, error);
+  if (error) {
+    return Error{Errc::unreadable,
+                 fmt::format("--factors {}: cannot be made; choose another folder", of.folder.string())};
+  }
   return factor_study(of);
 }
 

@@ -28,20 +28,10 @@ namespace fs = std::filesystem;
 
 /// Whether it names what is written, maybe after it was read. --keep,--show names labels.
 bool is_output(const CLI::Option& option) {
-  constexpr std::array kOutputs{"--out",
-                                "--json",
-                                "--report",
-                                "--picture",
-                                "--pictures",
-                                "--movie",
-                                "--map",
-                                "--history",
-                                "--keep",
-                                "--list-texts",
-                                "--factors",
-                                "--right-out",
-                                "--right-from-left-out",
-                                "--export"};
+  constexpr std::array kOutputs{
+      "--out",     "--json", "--report",     "--picture", "--pictures", "--movie",     "--map",
+      "--history", "--keep", "--list-texts", "--factors", "--study",    "--right-out", "--right-from-left-out",
+      "--export"};
   return !option.check_name("--show") &&
          std::ranges::any_of(kOutputs, [&option](const char* name) { return option.check_name(name); });
 }

@@ -30,13 +30,13 @@ std::string record_is_sound(const std::string& file) {
 }
 
 /// Likewise: who enters something signs all of the record.
-void refuse_unknown_author(const ResultPaths& paths) {
+std::string author_is_known(const std::string& file, bool accept_unsigned) {
   std::error_code ignored;
-  if (paths.record.empty() || !std::filesystem::exists(paths.record, ignored)) return;
-  const auto authors = Authors::of_this_machine(paths.accept_unsigned);
-  if (!authors) throw CLI::ValidationError("--record", authors.error().what);
-  if (const auto read = read_record(paths.record, *authors); !read)
-    throw CLI::ValidationError("--record", read.error().what);
+  if (!std::filesystem::exists(file, ignored)) return "";
+  const auto authors = Authors::of_this_machine(accept_unsigned);
+  if (!authors) return authors.error().what;
+  const auto read = read_record(file, *authors);
+  return read ? "" : read.error().what;
 }
 
 Result<std::string> record_of(const ResultPaths& paths, const RecordEntry& entry, Grade grade) {
@@ -56,12 +56,14 @@ void add_result_options(CLI::App& command, ResultPaths& paths, const std::string
             ->type_name("FILE")
             ->check(folder_is_there)
             ->check(record_is_sound);
-    command
-        .add_flag("--accept-unsigned", paths.accept_unsigned,
-                  "enter it also into a record that is not signed, or signed by a machine that is not known here, and "
-                  "sign that")
-        ->needs(into);
-    command.parse_complete_callback([&paths] { refuse_unknown_author(paths); });
+    CLI::Option* const accept =
+        command
+            .add_flag("--accept-unsigned", paths.accept_unsigned,
+                      "enter it also into a record that is not signed, or signed by a machine that is not known here, "
+                      "and sign that")
+            ->needs(into);
+    // A check of the option, and not the command's parse_complete_callback: that is for what concerns all options.
+    into->check([accept](const std::string& file) { return author_is_known(file, accept->as<bool>()); });
   }
   command.add_option("--report", paths.report, "a page with the figures and pictures (HTML)")
       ->type_name("FILE")

@@ -9,6 +9,7 @@
 #include "host/bench/bench_machine.hpp"
 #include "host/bench/bench_trials.hpp"
 #include "host/bench/register_study.hpp"
+#include "host/files/result_folder.hpp"
 #include "host/files/write_files.hpp"
 #include "host/registration/views/patch_field.hpp"
 #include "host/registration/views/rendered_views.hpp"
@@ -226,14 +227,22 @@ Result<json> rows_of(const StudyCondition& condition, int trials, Progress& prog
   return rows;
 }
 
+ResultFolder folder_of(const StudyOptions& options) {
+  return {.path = options.folder,
+          .command = "bench register --study",
+          .sheet = "study.json",
+          .names = R"((cost-curves|sweeps)\.svg)",
+          .key = "sweeps",
+          .option = "--study"};
+}
+
 }  // namespace
 
 Result<void> register_study(const StudyOptions& options) {
-  json all = {{"trials", options.trials},
-              {"phantom", options.usual.phantom},
-              {"viewport", options.usual.size},
-              {"rows", json::array()},
-              {"machine", bench_machine()}};
+  const ResultFolder folder = folder_of(options);
+  if (auto made = make_empty(folder, {}); !made) return made.error();
+  json all = {{"trials", options.trials},       {"sweeps", options.sweeps}, {"phantom", options.usual.phantom},
+              {"viewport", options.usual.size}, {"rows", json::array()},    {"machine", bench_machine()}};
   std::vector<FileText> files;
   if (std::find(options.sweeps.begin(), options.sweeps.end(), "light") != options.sweeps.end()) {
     auto curves = cost_curves(options.usual);
@@ -249,8 +258,10 @@ Result<void> register_study(const StudyOptions& options) {
     for (const json& row : *rows) all["rows"].push_back(row);
     // It takes a while: what there is, is kept.
     std::vector<FileText> now = files;
-    now.push_back({options.folder / "study.json", text_of(all)});
     now.push_back({options.folder / "sweeps.svg", sweep_plot(all["rows"], options)});
+    all["files"] = json::array();
+    for (const FileText& file : now) all["files"].push_back(file.path.filename().string());
+    now.push_back({options.folder / folder.sheet, text_of(all)});
     if (auto written = write_files(now); !written) return written.error();
   }
   return {};

@@ -1,6 +1,8 @@
 #include "host/dicom/dicom_dataset.hpp"
 
 #include <dcmtk/dcmdata/dcspchrs.h>
+#include <dcmtk/oflog/oflog.h>
+#include <dcmtk/oflog/spi/logevent.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,12 +16,55 @@ namespace birdseye::host {
 
 namespace fs = std::filesystem;
 
-Result<std::unique_ptr<DcmFileFormat>> load_dicom(const fs::path& path) {
+namespace {
+
+/// The tag, as "(0020,0032)", of an element that this thread read twice; empty where there was none.
+std::string& tag_read_twice() {
+  thread_local std::string tag;
+  return tag;
+}
+
+/// Of two elements of one tag DCMTK drops the second as it reads, and tells it to nobody but its log.
+class ReadTwice : public dcmtk::log4cplus::Appender {
+ public:
+  ReadTwice() = default;
+  ReadTwice(const ReadTwice&) = delete;
+  ReadTwice& operator=(const ReadTwice&) = delete;
+  ~ReadTwice() override { destructorImpl(); }
+  void close() override {}
+
+ protected:
+  void append(const dcmtk::log4cplus::spi::InternalLoggingEvent& event) override {
+    const std::string said(event.getMessage().c_str());
+    const std::size_t end = said.find(") found twice"), begin = said.rfind('(', end);
+    if (end == std::string::npos || begin == std::string::npos || !tag_read_twice().empty()) return;
+    const auto group = std::strtoul(said.c_str() + begin + 1, nullptr, 16);
+    // Those of odd groups are a maker's own and not read here; zeros behind a file's end pass for group 0.
+    if (group != 0 && group % 2 == 0) tag_read_twice() = said.substr(begin, end + 1 - begin);
+  }
+};
+
+void hear_of_elements_read_twice() {
+  static const bool hears = [] {
+    OFLog::getLogger("dcmtk.dcmdata").addAppender(dcmtk::log4cplus::SharedAppenderPtr(new ReadTwice));
+    return true;
+  }();
+  static_cast<void>(hears);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<DcmFileFormat>> load_dicom(const fs::path& path, std::string* twice) {
   // Some archives give up on what an attribute is, and write even the plainest with VR UN.
   dcmEnableUnknownVRConversion.set(OFTrue);
+  hear_of_elements_read_twice();
+  tag_read_twice().clear();
   auto file = std::make_unique<DcmFileFormat>();
   const OFCondition loaded = file->loadFile(path.c_str(), EXS_Unknown, EGL_noChange, DCM_MaxReadLength, ERM_autoDetect);
   if (loaded.bad()) return refused(Errc::bad_format, path, "is cut short, damaged or no DICOM; copy it again");
+  std::string found = tag_read_twice().empty() ? "" : fmt::format("has {} twice; export it again", tag_read_twice());
+  if (twice == nullptr && !found.empty()) return refused(Errc::bad_format, path, found);
+  if (twice != nullptr) *twice = std::move(found);
   return file;
 }
 

@@ -17,8 +17,9 @@ namespace birdseye::host {
 inline constexpr int kMostPixels = 8192;
 
 /// A DICOM file's elements. Long values stay in the file until they are asked for. Errc::bad_format where it is none,
-/// or is cut short.
-Result<std::unique_ptr<DcmFileFormat>> load_dicom(const std::filesystem::path& path);
+/// is cut short, or has an element twice, of which one reader takes the first and another the last. twice: where it is
+/// not null, it gets what is wrong with such a file, which is not refused then.
+Result<std::unique_ptr<DcmFileFormat>> load_dicom(const std::filesystem::path& path, std::string* twice = nullptr);
 
 /// The text of a tag with all of its values, without padding; empty where there is none. deep: also within sequences.
 std::string text_of(DcmItem& item, const DcmTagKey& tag, bool deep = false);

@@ -235,7 +235,8 @@ bool begins_as_dicom(const fs::path& path) {
 
 Result<DicomFile> read_dicom_file(const fs::path& path) {
   if (!begins_as_dicom(path)) return refused(Errc::bad_format, path, "is empty, damaged or no DICOM; copy it again");
-  const auto loaded = load_dicom(path);
+  std::string twice;
+  const auto loaded = load_dicom(path, &twice);
   if (!loaded) return loaded.error();
   DcmDataset& dataset = *(*loaded)->getDataset();
   DicomFile file;
@@ -287,7 +288,7 @@ Result<DicomFile> read_dicom_file(const fs::path& path) {
                      sop_class == UID_LegacyConvertedEnhancedCTImageStorage;
   const std::string type = text_of(dataset, DCM_ImageType);
   file.localizer = type.find("LOCALIZER") != std::string::npos || type.find("SCOUT") != std::string::npos;
-  if (file.kind == DicomFile::Kind::slices) file.fault = read_slices(dataset, file);
+  if (file.kind == DicomFile::Kind::slices) file.fault = twice.empty() ? read_slices(dataset, file) : twice;
   return file;
 }
 

@@ -9,9 +9,9 @@
 #include <opencv2/core.hpp>
 #include <optional>
 #include <set>
-#include <string_view>
 #include <vector>
 
+#include "host/files/opencv_numbers.hpp"
 #include "host/files/stored_matrix.hpp"
 
 namespace birdseye::host {
@@ -71,20 +71,6 @@ Error unknown_model(const char* key, const std::string& model) {
   return {Errc::unsupported, fmt::format("{} {} cannot be said by a lens here{}", key, model, kAnotherModel)};
 }
 
-/// A whole number that fits no int: OpenCV reads another in its place. Empty where there is none.
-std::string beyond_int(const std::string& text) {
-  constexpr const char* kBetween = " \t\r\n,:[]{}<>";
-  std::size_t end = 0;
-  for (std::size_t at = 0; (at = text.find_first_not_of(kBetween, end)) != std::string::npos;) {
-    end = std::min(text.find_first_of(kBetween, at), text.size());
-    int value = 0;
-    const char* const first = text.data() + at + (text[at] == '+' ? 1 : 0);
-    const auto [rest, failed] = std::from_chars(first, text.data() + end, value);
-    if (failed == std::errc::result_out_of_range && rest == text.data() + end) return text.substr(at, end - at);
-  }
-  return {};
-}
-
 /// A key that stands twice in the map, or in one of the maps right in it. Empty where there is none.
 std::string twice_in(const cv::FileNode& map, int deeper = 1) {
   if (!map.isMap()) return {};
@@ -93,42 +79,6 @@ std::string twice_in(const cv::FileNode& map, int deeper = 1) {
     if (!keys.insert(item.name()).second) return item.name();
     if (deeper == 0) continue;
     if (std::string twice = twice_in(item, deeper - 1); !twice.empty()) return twice;
-  }
-  return {};
-}
-
-/// Without what follows # in a line of YAML, where it is not in quotes; of XML and JSON, all.
-std::string without_comments(const std::string& text) {
-  if (text.substr(0, 16).find("%YAML") == std::string::npos) return text;
-  std::string out;
-  bool quoted = false, comment = false;
-  for (const char c : text) {
-    if (c == '\n') quoted = comment = false;
-    if (c == '"' && !comment) quoted = !quoted;
-    if (c == '#' && !quoted) comment = true;
-    if (!comment) out += c;
-  }
-  return out;
-}
-
-/// A picture's width or height that begins with 0, which OpenCV counts by eights. Empty where there is none.
-std::string octal_size(const std::string& file) {
-  constexpr std::string_view kDigits = "0123456789", kBeforeKey = "\n\"<{,-", kAfterKey = ":>";
-  constexpr const char* kBeforeNumber = " \t\r\n\":>+-";
-  const std::string text = without_comments(file);
-  for (const std::string_view key : {"image_width", "image_height"}) {
-    for (auto at = text.find(key); at != std::string::npos; at = text.find(key, at + 1)) {
-      const auto before = at == 0 ? std::string::npos : text.find_last_not_of(" \t\r", at - 1);
-      if (before != std::string::npos && kBeforeKey.find(text[before]) == std::string_view::npos) continue;
-      const auto told = text.find_first_not_of(" \t\r\n\"", at + key.size());
-      if (told == std::string::npos || kAfterKey.find(text[told]) == std::string_view::npos) continue;
-      auto from = text.find_first_not_of(kBeforeNumber, told);
-      if (from != std::string::npos && text[from] == '!')  // a tag, as !!int
-        from = text.find_first_not_of(kBeforeNumber, text.find_first_of(" \t\r\n", from));
-      from = std::min(from, text.size());
-      const auto end = std::min(text.find_first_not_of(kDigits, from), text.size());
-      if (end - from > 1 && text[from] == '0') return text.substr(from, end - from);
-    }
   }
   return {};
 }

@@ -21,13 +21,13 @@ constexpr const char* kUnended = "did_not_end";
 
 /// By its key, or as one that did not end.
 bool is_sheet_of(const ResultFolder& folder, const nlohmann::json& sheet) {
-  return sheet.contains("verdict") && (sheet.contains(kUnended) || (!folder.key.empty() && sheet.contains(folder.key)));
+  return (sheet.contains("verdict") && sheet.contains(kUnended)) || (!folder.key.empty() && sheet.contains(folder.key));
 }
 
 /// What in the folder is of an earlier run by its sheet: a list of names, or an object by name.
 std::vector<std::string> written_before(const ResultFolder& folder) {
   const auto sheet = read_json_file(folder.path / folder.sheet);
-  if (!sheet || !sheet->is_object() || !sheet->contains("verdict")) return {};
+  if (!sheet || !sheet->is_object() || !(sheet->contains("verdict") || is_sheet_of(folder, *sheet))) return {};
   std::vector<std::string> written{folder.sheet};
   if (const auto listed = sheet->find("files"); listed != sheet->end()) {
     for (const auto& [key, value] : listed->items()) {
@@ -81,14 +81,13 @@ Result<void> check_free(const ResultFolder& folder, const std::vector<fs::path>&
     std::error_code ignored;
     const auto is_this = [&](const fs::path& input) { return !input.empty() && fs::equivalent(input, file, ignored); };
     if (std::ranges::any_of(inputs, is_this)) {
-      return Error{Errc::bad_value, fmt::format("{}: is read, and would be written over by {}; give another --out",
-                                                file.string(), folder.command)};
+      return Error{Errc::bad_value, fmt::format("{}: is read, and would be written over by {}; give another {}",
+                                                file.string(), folder.command, folder.option)};
     }
     if (std::ranges::count(written, name) == 0) {
       return Error{Errc::bad_value,
-                   fmt::format("{}: is there, and not of an earlier {}; give another --out, or move the "
-                               "file away",
-                               file.string(), folder.command)};
+                   fmt::format("{}: is there, and not of an earlier {}; give another {}, or move the file away",
+                               file.string(), folder.command, folder.option)};
     }
   }
   return {};
@@ -112,8 +111,8 @@ Result<std::vector<std::string>> make_empty(const ResultFolder& folder, const st
     std::error_code error;
     fs::remove(folder.path / name, error);
     if (error) {
-      return Error{Errc::unreadable, fmt::format("{}: is of an earlier {} and cannot be removed; give another --out",
-                                                 (folder.path / name).string(), folder.command)};
+      return Error{Errc::unreadable, fmt::format("{}: is of an earlier {} and cannot be removed; give another {}",
+                                                 (folder.path / name).string(), folder.command, folder.option)};
     }
   }
   return old;

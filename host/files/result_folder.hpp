@@ -15,9 +15,10 @@ struct ResultFolder {
   std::string command;  ///< as "register views", for messages
   std::string sheet;    ///< as "result.json"
   std::string names;    ///< a regular expression for those of the others
-  /// What every sheet of the command holds, where there are sheets of it that list no files: all in the folder that has
-  /// one of the names is theirs. Empty: there are none.
+  /// What every sheet of the command holds, where there are sheets of it that have no verdict, or list no files: where
+  /// one lists none, all in the folder that has one of the names is its own. Empty: there are no such sheets.
   std::string key = {};
+  const char* option = "--out";  ///< that names the folder, for messages
 };
 
 /// Before the work. Refuses, naming the file and the remedy, where one of its names is taken in the folder: by a file

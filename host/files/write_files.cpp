@@ -14,6 +14,7 @@
 
 #include "calibration/record/strict_json.hpp"
 #include "drivers/system/durable.hpp"
+#include "drivers/system/part_file.hpp"
 #include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::host {
@@ -96,12 +97,10 @@ Result<void> put_part(const FileText& file, fs::path& part) {
     return Error{Errc::unreadable, fmt::format("{}: is too long a name; give a shorter one", file.path.string())};
   const mode_t mode = replaces ? former.st_mode & 0777U : 0666U;
   UniqueFd fd;
-  errno = EEXIST;
-  for (int n = 0; !fd && errno == EEXIST; ++n) {
-    part = file.path.parent_path() / fmt::format(".{}.part", n);
-    fd = UniqueFd(::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
-  }
-  if (!fd) part.clear();
+  part = take_part_name(file.path, [&](const fs::path& name) {
+    fd = UniqueFd(::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, mode));
+    return static_cast<bool>(fd);
+  });
   if (fd && replaces && ::fchmod(fd.get(), mode) != 0) return cannot_be_written(file.path);
   return put(fd, file);
 }

@@ -1,5 +1,4 @@
 #include <CLI/CLI.hpp>
-#include <map>
 #include <string>
 
 #include "drivers/system/interrupt.hpp"
@@ -25,6 +24,7 @@ int main(int argc, char** argv) {
   using namespace birdseye;
   CLI::App app{"birdseye-sim: a patient, a tracker and a laparoscope for the appliance, with known truth",
                "birdseye-sim"};
+  app.set_version_flag("--version", "birdseye-sim " BIRDSEYE_VERSION);
   app.require_subcommand(1);
   bool end_with_stdin = false;
   OwnedThread watch;
@@ -82,11 +82,9 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0, 1000.0));
   run.add_option("--faults", cart.faults,
                  "script of faults of either instrument, and of what befalls the operation (TOML)");
-  const std::map<std::string, hw_sim::ReferenceOn> fixed_on{{"patient", hw_sim::ReferenceOn::patient},
-                                                            {"table", hw_sim::ReferenceOn::table}};
-  run.add_option("--reference", cart.reference, "patient or table: fix a third bird on it")
-      ->transform(CLI::CheckedTransformer(fixed_on))
-      ->type_name("ON");
+  std::string fixed_on;
+  run.add_option("--reference", fixed_on, "patient or table: fix a third bird on it")
+      ->check(CLI::IsMember({"patient", "table"}));
   run.add_option("--size", size, "WIDTHxHEIGHT of the video");
   run.add_option("--dwell-s", cart.pace.dwell_s, "how long the scope is held still at each station over the board")
       ->check(CLI::Range(0.1, 20.0));
@@ -107,6 +105,8 @@ int main(int argc, char** argv) {
         return;
       }
     }
+    if (!fixed_on.empty())
+      cart.reference = fixed_on == "patient" ? hw_sim::ReferenceOn::patient : hw_sim::ReferenceOn::table;
     const auto kept = hw_sim::keep_inputs({cart.folder / "cart.json", cart.folder / "truth/truth.json"}, {cart.faults});
     take(kept ? hw_sim::run_cart(cart, note_interrupts()) : kept);
   });

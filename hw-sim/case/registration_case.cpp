@@ -18,6 +18,7 @@
 #include "hw-sim/case/viewpoints.hpp"
 #include "hw-sim/phantom/image_files.hpp"
 #include "hw-sim/phantom/json_file.hpp"
+#include "hw-sim/phantom/own_files.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -211,11 +212,34 @@ nlohmann::json truth_of(const CaseSettings& settings, const MadeCase& made) {
   return truth;
 }
 
+OwnFiles own_files(const std::filesystem::path& folder) {
+  return {folder,
+          "birdseye-sim case",
+          "birdseye-sim-case.json",
+          {"truth"},
+          R"((ct|segmentation)\.nii\.gz|camera\.yaml|mask\.png|view[0-9]+\.(png|txt)|points\.csv|case\.toml|)"
+          R"(truth/(field\.mha|landmarks\.csv|truth\.json|control_points\.json|view[0-9]+\.txt))"};
+}
+
+/// What write_all() writes.
+std::vector<std::string> names_of(const CaseSettings& settings, const MadeCase& made) {
+  std::vector<std::string> names{"ct.nii.gz", "segmentation.nii.gz", "camera.yaml",      "mask.png",
+                                 "case.toml", "truth/field.mha",     "truth/truth.json", "truth/landmarks.csv"};
+  for (std::size_t i = 0; i < made.views.size(); ++i) {
+    names.push_back(fmt::format("view{}.png", i));
+    names.push_back(fmt::format("view{}.txt", i));
+    if (settings.pose_error.any()) names.push_back(fmt::format("truth/view{}.txt", i));
+  }
+  if (made.deformation.patch) names.emplace_back("truth/control_points.json");
+  if (!made.touches_mm.empty()) names.emplace_back("points.csv");
+  return names;
+}
+
 Result<void> write_all(const CaseSettings& settings, const MadeCase& made) {
   const std::filesystem::path& folder = settings.folder;
-  std::error_code error;
-  std::filesystem::create_directories(folder / "truth", error);
-  if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", folder.string())};
+  // Once more, for the case took a while to make.
+  if (auto is_free = check_free(own_files(folder)); !is_free) return is_free;
+  if (auto begun = begin_files(own_files(folder), names_of(settings, made)); !begun) return begun;
   std::vector<Result<void>> written(3);
   // Each is a file through one codec on one core.
   tbb::parallel_for(0, 3, [&](int file) {
@@ -228,25 +252,13 @@ Result<void> write_all(const CaseSettings& settings, const MadeCase& made) {
   for (std::size_t i = 0; i < made.views.size(); ++i) {
     written.push_back(write_picture(folder / fmt::format("view{}.png", i), made.pictures[i], made.lens));
     written.push_back(write_pose(folder / fmt::format("view{}.txt", i), made.stated_views[i]));
-    const std::filesystem::path true_pose = folder / "truth" / fmt::format("view{}.txt", i);
-    if (settings.pose_error.any()) {
-      written.push_back(write_pose(true_pose, made.views[i]));
-    } else {
-      std::filesystem::remove(true_pose, error);  // of a case that lay here before
-    }
+    if (settings.pose_error.any())
+      written.push_back(write_pose(folder / "truth" / fmt::format("view{}.txt", i), made.views[i]));
   }
-  const std::filesystem::path control_points = folder / "truth" / "control_points.json";
-  if (made.deformation.patch) {
-    written.push_back(write_control_points(control_points, *made.deformation.patch));
-  } else {
-    std::filesystem::remove(control_points, error);
-  }
-  const std::filesystem::path points = folder / "points.csv";
-  if (made.touches_mm.empty()) {
-    std::filesystem::remove(points, error);
-  } else {
-    written.push_back(write_surface_points(points, made.touches_mm, settings.touch_noise_mm));
-  }
+  if (made.deformation.patch)
+    written.push_back(write_control_points(folder / "truth" / "control_points.json", *made.deformation.patch));
+  if (!made.touches_mm.empty())
+    written.push_back(write_surface_points(folder / "points.csv", made.touches_mm, settings.touch_noise_mm));
   written.push_back(write_landmarks(folder / "truth" / "landmarks.csv", made.landmarks));
   written.push_back(write_json(folder / "truth" / "truth.json", truth_of(settings, made)));
   written.push_back(write_text(folder / "case.toml", case_toml(settings, made)));
@@ -258,6 +270,7 @@ Result<void> write_all(const CaseSettings& settings, const MadeCase& made) {
 
 Result<void> write_case(const CaseSettings& settings) {
   if (auto checked = check(settings); !checked) return checked;
+  if (auto is_free = check_free(own_files(settings.folder)); !is_free) return is_free;
   const auto made = make_case(settings);
   if (!made) return made.error();
   return write_all(settings, *made);

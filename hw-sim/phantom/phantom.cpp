@@ -1,7 +1,9 @@
 #include "hw-sim/phantom/phantom.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -14,6 +16,7 @@
 #include "hw-sim/phantom/implants.hpp"
 #include "hw-sim/phantom/json_file.hpp"
 #include "hw-sim/phantom/mesh.hpp"
+#include "hw-sim/phantom/own_files.hpp"
 #include "hw-sim/phantom/shapes.hpp"
 
 namespace birdseye::hw_sim {
@@ -22,14 +25,14 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr std::array kSurfaces{"liver", "skin", "portal", "hepatic", "tumour", "markers"};
+
 Result<Vector3d> vector_of(const nlohmann::json& json) {
   if (!json.is_array() || json.size() != 3) return Error{Errc::bad_format, "needs three numbers"};
   return Vector3d(json[0].get<double>(), json[1].get<double>(), json[2].get<double>());
 }
 
 Result<void> write_surfaces(const std::filesystem::path& folder, const Body& body, const Implants& implants) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
   const Vector3d low = body.grid.origin_mm;
   const Vector3d high = body.grid.last_mm();
   const auto write = [&](const char* name, const Field& field, const Vector3d& from, const Vector3d& to, double mm) {
@@ -87,10 +90,29 @@ Result<void> check_series(const std::filesystem::path& folder) {
                            series.string())};
 }
 
+/// All but the series, which is known as ours by its slices.
+OwnFiles own_files(const std::filesystem::path& folder) {
+  return {folder,
+          "birdseye-sim phantom",
+          "birdseye-sim-phantom.json",
+          {"surfaces"},
+          fmt::format(R"(segmentation\.nii\.gz|truth\.json|surfaces/({})\.ply)", fmt::join(kSurfaces, "|"))};
+}
+
+/// Files that no phantom is of may be somebody's own. Versions to 0.2.0 kept no list of theirs, and wrote truth.json
+/// last.
+Result<void> check_files(const OwnFiles& own) {
+  std::error_code ignored;
+  const bool listed = std::filesystem::exists(own.folder / own.list, ignored);
+  return !listed && read_phantom_truth(own.folder) ? Result<void>() : check_free(own);
+}
+
 }  // namespace
 
 Result<void> write_phantom(const PhantomSettings& settings) {
+  const OwnFiles own = own_files(settings.folder);
   if (auto free = check_series(settings.folder); !free) return free;
+  if (auto free = check_files(own); !free) return free;
   std::error_code error;
   std::filesystem::create_directories(settings.folder, error);
   if (error) {
@@ -104,6 +126,9 @@ Result<void> write_phantom(const PhantomSettings& settings) {
     return implants.error().with_context(settings.ct.string());
   }
   const std::vector<std::uint8_t> labels = implant(*body, *implants, settings.seed);
+  std::vector<std::string> names{"segmentation.nii.gz", "truth.json"};
+  for (const char* surface : kSurfaces) names.push_back(fmt::format("surfaces/{}.ply", surface));
+  if (auto begun = begin_files(own, names); !begun) return begun;
 
   // The series is one file after another through one codec; the surfaces are sums. They take each other's time.
   Result<void> series;

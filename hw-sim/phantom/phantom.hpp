@@ -17,9 +17,10 @@ struct PhantomSettings {
   int liver_label = 5;           ///< the liver's value in labels
 };
 
-/// Writes folder/ct (DICOM series), folder/segmentation.nii.gz, folder/surfaces/*.ply and folder/truth.json. The same
-/// settings give the same bytes. A folder/ct that is not empty is refused, but where a phantom was written before, or
-/// the beginning of one.
+/// Writes folder/ct (DICOM series), folder/segmentation.nii.gz, folder/surfaces/*.ply and folder/truth.json, and lists
+/// the files in folder/birdseye-sim-phantom.json. The same settings give the same bytes. A folder/ct that is not empty
+/// is refused, and so is a file that has one of these names, but where a phantom was written before, or the beginning
+/// of one.
 Result<void> write_phantom(const PhantomSettings& settings);
 
 /// What folder/truth.json says, patient LPS mm.

@@ -75,7 +75,7 @@ def write_recording(folder, events, tracker, pictures, size):
     (folder / "tracker.igs.mha").write_text(tracker)
     header = (f"ObjectType = Image\nNDims = 3\nBinaryData = True\nCompressedData = False\nDimSize = {size[0]} {size[1]} {len(pictures)}\n"
               "ElementType = MET_UCHAR\nUltrasoundImageOrientation = MF\nUltrasoundImageType = BRIGHTNESS\n")
-    frames = "".join(f"Seq_Frame{k:04}_Timestamp = {k}\nSeq_Frame{k:04}_ImageStatus = OK\n" for k in range(len(pictures)))
+    frames = "".join(f"Seq_Frame{k:04}_ImageStatus = OK\n" for k in range(len(pictures)))
     (folder / "video.igs.mha").write_bytes((header + frames + "ElementDataFile = LOCAL\n").encode() + b"".join(pictures))
 
 

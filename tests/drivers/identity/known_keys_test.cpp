@@ -61,6 +61,19 @@ TEST(KnownKeys, ReadsWhatWasAddedAndLeavesRemarks) {
   }
 }
 
+TEST(KnownKeys, NothingIsWrittenThroughALinkBesideTheFile) {
+  const Scratch folder;
+  const std::string other = folder.file("other.txt", "another's");
+  fs::create_symlink(other, folder / "known.part");
+  auto known = KnownKeys::read(folder.path(), kOwn);
+  ASSERT_TRUE(known) << known.error().what;
+  ASSERT_TRUE(known->add("cart-2", key_of(3)));
+  EXPECT_EQ(testing::contents_of(other), "another's");
+  EXPECT_TRUE(fs::is_symlink(folder / "known.part"));
+  EXPECT_FALSE(fs::is_symlink(folder / "known"));
+  EXPECT_EQ(fs::status(folder / "known").permissions(), fs::perms::owner_read | fs::perms::owner_write);
+}
+
 TEST(KnownKeys, AddsNoKeyTwiceNoNameOfAnotherKeyAndNoNameThatIsNoWord) {
   const Scratch folder;
   auto known = KnownKeys::read(folder.path(), kOwn);

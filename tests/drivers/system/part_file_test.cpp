@@ -88,5 +88,34 @@ TEST(PartFile, WhatIsNoFileIsRefusedByItsName) {
   EXPECT_EQ(files_in(scratch.path()), 2);
 }
 
+TEST(PartFile, NoNameOfAnothersIsTaken) {
+  const Scratch scratch;
+  const std::string own = scratch.file(".0.part", "the user's own");
+  fs::create_symlink(scratch / "none", scratch / ".1.part");
+  const auto part = PartFile::make(scratch / "a.mha");
+  ASSERT_TRUE(part) << part.error().what;
+  EXPECT_EQ(part->folder(), scratch / ".2.part") << "the first that is free: as a simulated operation has it each time";
+  EXPECT_EQ(contents_of(own), "the user's own");
+}
+
+TEST(WriteDurably, ANewFileHasThePermissionsThatAreAskedForAndAFormerOneItsOwn) {
+  const Scratch scratch;
+  const fs::path place = scratch / "known";
+  const auto mode = [&place] { return fs::status(place).permissions(); };
+  const fs::perms of_owner = fs::perms::owner_read | fs::perms::owner_write;
+  forget_synced();
+  ASSERT_TRUE(write_durably(place, "one", of_owner));
+  EXPECT_TRUE(is_synced(place));
+  EXPECT_EQ(mode(), of_owner);
+  fs::permissions(place, of_owner | fs::perms::others_read);
+  ASSERT_TRUE(write_durably(place, "two", of_owner));
+  EXPECT_EQ(mode(), of_owner | fs::perms::others_read);
+  EXPECT_EQ(contents_of(place), "two");
+  EXPECT_EQ(files_in(scratch.path()), 1);
+  const auto nowhere = write_durably(scratch / "none/known", "three");
+  ASSERT_FALSE(nowhere);
+  EXPECT_NE(nowhere.error().what.find("none/known: cannot be written"), std::string::npos) << nowhere.error().what;
+}
+
 }  // namespace
 }  // namespace birdseye

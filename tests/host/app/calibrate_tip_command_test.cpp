@@ -7,8 +7,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "calibration/record/calibration_record.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/example_record.hpp"
 #include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/simulated_pointer.hpp"
@@ -168,6 +170,18 @@ TEST(CalibrateTip, InputThatCannotBeUsedIsRefusedInOneLine) {
         {good + " --spin " + (scratch / "no.csv").string(), "no such file"}}) {
     testing::expect_refused("birdseye", command(scratch, arguments), {words}, scratch / "tip.txt");
   }
+}
+
+/// Who enters something signs all of the record.
+TEST(CalibrateTip, ARecordOfNobodyKnownIsRefusedBeforeTheWork) {
+  const Scratch scratch;
+  const std::string record =
+      scratch.file("record.json", calibration::record_text(testing::example_record(768, 576, {}, {})));
+  const std::string before = contents_of(record);
+  const std::string tip = command(scratch, scratch.file("none.csv", "no poses\n")) + " --record " + record;
+  testing::expect_refused("birdseye", tip, {"--record: " + record + ": the calibration record is not signed"});
+  testing::expect_refused("birdseye", tip + " --accept-unsigned", {"none.csv"});
+  EXPECT_EQ(contents_of(record), before);
 }
 
 TEST(CalibrateTip, WhatWouldBeOfNoEffectIsRefusedByName) {

@@ -358,6 +358,7 @@ TEST(Commands, WhatIsReadIsNotWrittenOver) {
   expect_refused("birdseye",
                  "calibrate field check --plate p --measured m --history " + here + " --json " + folder + "/new.json",
                  twice);
+  expect_refused("birdseye", "bench register --study " + here + " --json " + folder + "/new.json", twice);
   expect_refused("birdseye", "export --views " + folder + " --out " + (scratch / "o").string() + " --json " + file,
                  over);
   EXPECT_EQ(testing::contents_of(file), "{}");
@@ -397,6 +398,18 @@ TEST(Commands, DemoLeavesFoldersOfTheUsersOwn) {
     EXPECT_EQ(testing::contents_of(own), "the user's own");
     fs::remove(scratch / "report.json");
     fs::remove_all(scratch / name);
+  }
+}
+
+TEST(Commands, AStudyLeavesFilesOfTheUsersOwn) {
+  const Scratch scratch;
+  for (const char* name : {"study.json", "sweeps.svg", "cost-curves.svg"}) {
+    const std::string own = scratch.file(name, "the user's own");
+    expect_refused("birdseye", "bench register --quick --sweep noise --study " + scratch.path().string(),
+                   {name, "not of an earlier bench register --study", "give another --study"});
+    EXPECT_EQ(testing::contents_of(own), "the user's own");
+    fs::remove(own);
+    EXPECT_TRUE(fs::is_empty(scratch.path()));
   }
 }
 

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <fstream>
 #include <functional>
 #include <string>
 
@@ -67,6 +69,31 @@ TEST(DicomDoubts, SlicesOfTwoFramesOfReferenceAreNoVolume) {
   VolumeSource untilted(scratch / "two");
   untilted.untilt = true;
   EXPECT_FALSE(import_volume(untilted));
+}
+
+/// Behind all of a file's elements, explicit and little-endian, one more of text.
+void append_element(const fs::path& path, std::uint16_t group, std::uint16_t element, const std::string& vr,
+                    const std::string& value) {
+  std::ofstream out(path, std::ios::binary | std::ios::app);
+  for (const std::size_t number : {std::size_t{group}, std::size_t{element}})
+    out << static_cast<char>(number & 0xFFU) << static_cast<char>(number >> 8U);
+  out << vr << static_cast<char>(value.size()) << '\0' << value;
+}
+
+/// Of such an element DCMTK reads the first, other programs the last.
+TEST(DicomDoubts, AnElementThatStandsTwiceIsRefusedByItsTag) {
+  const Scratch scratch;
+  write_four(scratch / "ct", [](DcmDataset&, int) {});
+  const fs::path slice = scratch / "ct/2.dcm";
+  for (int n = 0; n < 2; ++n) append_element(slice, 0x7FE1, 0x0010, "LO", "a maker's own ");
+  EXPECT_TRUE(import_volume(scratch / "ct")) << "what a maker adds is not read";
+  append_element(slice, 0x0020, 0x0032, "DS", "0\\0\\500 ");
+  for (const fs::path& given : {slice, fs::path(scratch / "ct")}) {
+    const auto twice = import_volume(given);
+    ASSERT_FALSE(twice) << given;
+    EXPECT_NE(twice.error().what.find("2.dcm: has (0020,0032) twice; export it again"), std::string::npos)
+        << twice.error().what;
+  }
 }
 
 TEST(DicomDoubts, EachSliceHasItsOwnScale) {

@@ -1,5 +1,6 @@
 #include "host/files/camera_files.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -221,6 +222,19 @@ TEST(CameraFiles, AWholeNumberIsDecimal) {
     ASSERT_TRUE(sound) << sound.error().what;
     EXPECT_EQ(*sound, kLens) << line;
   }
+  for (const char* tag :
+       {"image_width", "image_width type_id=\"x\"", "image_width type_id='>'", "image_width\n id=\"1\" "}) {
+    const auto xml =
+        read_lens_text(fmt::format("<?xml version=\"1.0\"?>\n<opencv_storage>\n<{}>064</image_width>\n"
+                                   "<image_height>480</image_height>\n</opencv_storage>\n",
+                                   tag));
+    ASSERT_FALSE(xml) << tag;
+    EXPECT_THAT(xml.error().what, HasSubstr("lens.yaml: has a picture of 064 px")) << tag;
+  }
+  const auto another = read_lens_text(
+      "<?xml version=\"1.0\"?>\n<opencv_storage>\n<image_width_old>064</image_width_old>\n</opencv_storage>\n");
+  ASSERT_FALSE(another);
+  EXPECT_THAT(another.error().what, HasSubstr("lacks image_width"));
   const auto letters = read_lens_text(changed(kRos, "752", "752px"));
   ASSERT_FALSE(letters);
   EXPECT_THAT(letters.error().what, HasSubstr("a whole decimal number belongs there"));

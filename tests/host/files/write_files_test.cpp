@@ -163,6 +163,24 @@ TEST(ResultFolder, WhatNoEarlierRunListsIsRefused) {
     EXPECT_TRUE(check_free(folder, kNoInputs, {scratch.path() / name})) << name;
 }
 
+TEST(ResultFolder, ASheetWithoutAVerdictIsKnownByItsKey) {
+  const birdseye::testing::Scratch scratch;
+  ResultFolder folder = folder_in(scratch);
+  folder.key = "sweeps";
+  folder.option = "--study";
+  const std::string text = scratch.file("a.txt", "the user's own");
+  (void)scratch.file("export.json", R"({"files": ["a.txt"]})");
+  const auto own = make_empty(folder, kNoInputs);
+  ASSERT_FALSE(own);
+  EXPECT_NE(own.error().what.find("give another --study, or move"), std::string::npos) << own.error().what;
+  (void)scratch.file("export.json", R"({"sweeps": [], "files": ["a.txt"]})");
+  (void)scratch.file("p1.png", "the user's own");
+  EXPECT_FALSE(make_empty(folder, kNoInputs)) << "it lists no p1.png";
+  std::filesystem::remove(scratch / "p1.png");
+  EXPECT_TRUE(make_empty(folder, kNoInputs));
+  EXPECT_FALSE(std::filesystem::exists(text));
+}
+
 TEST(FilesSha256, AFileIsAsTheSheetBesideItSaysOrRefused) {
   const birdseye::testing::Scratch scratch;
   const std::string field = scratch.file("field.mha", "displacements");

@@ -134,6 +134,17 @@ TEST(Programs, NoOutputIsAnInput) {
   EXPECT_EQ(contents_of(slice), "a patient's");
 }
 
+TEST(Programs, WhatIsTheUsersOwnIsNotWrittenOver) {
+  for (const std::string command : {"phantom", "case"}) {
+    const Scratch scratch;
+    const std::string own = scratch.file("segmentation.nii.gz", "a user's");
+    expect_refused("birdseye-sim", command + " --out " + scratch.path().string(),
+                   {own + ": is there", "no earlier birdseye-sim " + command, "choose another --out"},
+                   scratch / ("birdseye-sim-" + command + ".json"));
+    EXPECT_EQ(contents_of(own), "a user's");
+  }
+}
+
 TEST(Programs, ACameraSaysWhereItIsAndWhatItSent) {
   const Scratch scratch;
   const std::string truth = (scratch / "truth.json").string();
@@ -166,8 +177,25 @@ TEST(Programs, WhatIsNoNumberIsNoLengthOfAnOperation) {
   expect_refused("birdseye-sim", "campaign --seeds 1:1000000000 --out " + out, {"10000000 of them"}, out);
 }
 
+TEST(Programs, TellOneVersion) {
+  std::string versions;
+  for (const std::string program : {"birdseye-sim", "birdseye", "birdseyed"}) {
+    const auto told = run(program, "--version");
+    EXPECT_EQ(told.code, 0) << told.output;
+    ASSERT_EQ(told.output.rfind(program + " ", 0), 0U) << told.output;
+    const std::string version = told.output.substr(program.size() + 1);
+    if (versions.empty()) versions = version;
+    EXPECT_EQ(version, versions);
+  }
+}
+
 TEST(Programs, WrongOptionsAreNamed) {
   const Scratch scratch;
+  const auto fixed = run("birdseye-sim", "cart --phantom p --socket s --tty t --out o --reference table1");
+  EXPECT_EQ(fixed.code, 2);
+  EXPECT_NE(fixed.output.find("{patient,table}"), std::string::npos) << fixed.output;
+  EXPECT_EQ(fixed.output.find("->"), std::string::npos) << fixed.output;
+  EXPECT_EQ(run("birdseye-sim", "cart --help").output.find("->"), std::string::npos);
   const std::string tty = "--tty " + (scratch / "tty").string();
   expect_refused("birdseye-sim", "minibird", {"--tcp"});
   expect_refused("birdseye-sim", "minibird " + tty + " --tcp 0", {"--tcp", "2 were given"});

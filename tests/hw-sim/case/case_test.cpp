@@ -85,7 +85,7 @@ TEST(Case, TheSameSettingsGiveTheSameBytesAndAnotherSeedDoesNot) {
   settings.seed = 4;
   ASSERT_TRUE(write_case(settings));
   const auto a = files_of(scratch / "a");
-  EXPECT_EQ(a.size(), 15U);  // case, camera, mask, CT, labels, four of the truth, and two a view
+  EXPECT_EQ(a.size(), 16U);  // case, camera, mask, CT, labels, four of the truth, two a view, and the list of them
   EXPECT_TRUE(a == files_of(scratch / "b"));
   auto c = files_of(scratch / "c");
   for (const char* name : {"ct.nii.gz", "view0.png", "truth/field.mha", "truth/landmarks.csv"})
@@ -336,6 +336,20 @@ TEST(Case, InstrumentsCoverPartOfThePictures) {
     most = std::max(most, share);
   }
   EXPECT_GT(most, 0.01);
+}
+
+TEST(Case, AFileByOneOfItsNamesIsRefusedUnlessAnEarlierCaseListsIt) {
+  const Scratch scratch;
+  fs::create_directories(scratch / "c/truth");
+  for (const char* name : {"ct.nii.gz", "view17.txt", "points.csv", "truth/control_points.json"}) {
+    const std::string own = scratch.file("c/" + std::string(name), "a user's");
+    const auto outcome = write_case(small_case(scratch / "c"));
+    ASSERT_FALSE(outcome) << name;
+    EXPECT_EQ(outcome.error().what.rfind(own + ": is there, and no earlier birdseye-sim case", 0), 0U)
+        << outcome.error().what;
+    EXPECT_EQ(contents_of(own), "a user's");
+    fs::remove(own);
+  }
 }
 
 TEST(Case, RefusesInOneLine) {

@@ -4,6 +4,7 @@
 
 #include "hw-sim/phantom/dicom_series.hpp"
 #include "hw-sim/phantom/grid.hpp"
+#include "hw-sim/phantom/own_files.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::hw_sim {
@@ -82,6 +83,46 @@ TEST(Phantom, AHalfSeriesOfItsOwnIsReplaced) {
   EXPECT_NE(told_of(scratch).find("none.nii.gz"), std::string::npos) << told_of(scratch);
   (void)scratch.file("ph/ct/IM0001.dcm", ours);
   EXPECT_NE(told_of(scratch).find(refused), std::string::npos) << "another's name";
+}
+
+TEST(Phantom, AFileByOneOfItsNamesIsReplacedOnlyWhereItIsListed) {
+  for (const std::string name : {"segmentation.nii.gz", "surfaces/liver.ply", "truth.json"}) {
+    const Scratch scratch;
+    fs::create_directories(scratch / "ph/surfaces");
+    const std::string own = scratch.file("ph/" + name, "a user's");
+    (void)scratch.file("ph/surfaces/mine.ply", "a user's");
+    const std::string list = "ph/birdseye-sim-phantom.json", refused = own + ": is there, and no earlier";
+    EXPECT_NE(told_of(scratch).find(refused), std::string::npos) << told_of(scratch);
+    for (const char* words : {"{}", R"({"written_by": "birdseye-sim case", "files": []})"}) {
+      (void)scratch.file(list, words);
+      EXPECT_NE(told_of(scratch).find(list + ": is there, and no earlier"), std::string::npos) << told_of(scratch);
+    }
+    (void)scratch.file(list, R"({"written_by": "birdseye-sim phantom", "files": ["surfaces/skin.ply"]})");
+    EXPECT_NE(told_of(scratch).find(refused), std::string::npos) << told_of(scratch);
+    EXPECT_EQ(contents_of(own), "a user's");
+    (void)scratch.file(list, R"({"written_by": "birdseye-sim phantom", "files": [")" + name + R"("]})");
+    EXPECT_NE(told_of(scratch).find("none.nii.gz"), std::string::npos) << told_of(scratch);
+  }
+}
+
+TEST(OwnFiles, AreListedBeforeTheyAreWrittenAndTheFormerRunsAreRemoved) {
+  const Scratch scratch;
+  const OwnFiles own{scratch / "out", "birdseye-sim case", "list.json", {"truth"}, R"(v[0-9]\.png|truth/t\.json)"};
+  ASSERT_TRUE(check_free(own)) << "there is no such folder";
+  ASSERT_TRUE(begin_files(own, {"v0.png", "v1.png", "truth/t.json"}));
+  for (const char* quoted : {R"("v0.png")", R"("v1.png")", R"("truth/t.json")"})
+    EXPECT_NE(contents_of(scratch / "out/list.json").find(quoted), std::string::npos) << quoted;
+  for (const char* name : {"out/v1.png", "out/truth/t.json", "out/mine.png"}) (void)scratch.file(name, "text");
+  fs::create_symlink(scratch / "out/mine.png", scratch / "out/v0.png");
+  ASSERT_TRUE(check_free(own));
+  ASSERT_TRUE(begin_files(own, {"v0.png"}));
+  for (const char* name : {"out/v0.png", "out/v1.png", "out/truth/t.json"})
+    EXPECT_FALSE(fs::exists(fs::symlink_status(scratch / name))) << name;
+  EXPECT_EQ(contents_of(scratch / "out/mine.png"), "text");
+  const std::string later = scratch.file("out/v1.png", "a user's");
+  const auto taken = check_free(own);
+  ASSERT_FALSE(taken) << "the last run wrote none";
+  EXPECT_EQ(taken.error().what.rfind(later + ": ", 0), 0U) << taken.error().what;
 }
 
 }  // namespace
