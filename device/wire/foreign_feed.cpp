@@ -9,9 +9,6 @@ namespace birdseye::wire {
 
 namespace {
 
-/// How far the times that a server gives to pictures and to poses may be apart: it calibrates them, and says nothing of
-/// how well.
-constexpr Duration kStampSigma = Duration::from_ms(5);
 constexpr Duration kUnstampedSigma = Duration::from_ms(50);
 /// Poses of a picture's time often follow it; a picture that waits longer grows old.
 constexpr Duration kPatience = Duration::from_ms(40);
@@ -100,7 +97,7 @@ void ForeignFeed::take(const Header& header, ForeignPicture picture, HostTime ar
   VideoFrame& frame = waiting.frame;
   frame.info.acquired = time_of(header, arrived);
   frame.info.sequence = pictures_++;
-  frame.info.acquired_sigma = waiting.stamped ? kStampSigma : kUnstampedSigma;
+  frame.info.acquired_sigma = waiting.stamped ? kForeignStampSigma : kUnstampedSigma;
   frame.info.arrived = relation_.device_from_host(arrived).value_or(DeviceTime{arrived.ns});
   frame.width_px = picture.width_px;
   frame.height_px = picture.height_px;
@@ -121,6 +118,9 @@ void ForeignFeed::take(const Header& header, const ForeignPoses& poses, HostTime
     return &tools_.try_emplace(name, Tool{PoseHistory(history_settings()), std::nullopt, std::nullopt, {}, stamped})
                 .first->second;
   };
+  for (const std::string& name : poses.doubled)
+    pass_over(fmt::format("\"{}\", which stands twice in one list: give the tools names whose first 20 letters differ",
+                          name));
   for (const std::string& name : poses.no_poses) (void)tool_of(name);
   Birds birds{time, {}};
   for (const Bird& bird : poses.birds) {
@@ -137,7 +137,7 @@ void ForeignFeed::take(const Header& header, const ForeignPoses& poses, HostTime
     const auto newest = tool->poses.newest();
     if (newest && *newest - time > kWayBack) tool->poses = PoseHistory(history_settings());
     // One that is sent twice, as by TRANSFORM and by TDATA, is one measurement.
-    if (stamped && !tool->poses.push(time, kStampSigma, bird.tracker_from_sensor)) continue;
+    if (stamped && !tool->poses.push(time, kForeignStampSigma, bird.tracker_from_sensor)) continue;
     birds.birds.push_back(bird);
   }
   if (settings_.scope_bird.empty()) {

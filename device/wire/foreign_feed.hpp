@@ -13,6 +13,10 @@
 
 namespace birdseye::wire {
 
+/// How far the times that a server gives to pictures and to poses may be apart: it calibrates them, and says nothing of
+/// how well.
+inline constexpr Duration kForeignStampSigma = Duration::from_ms(5);
+
 /// Which devices to use of a server that is no appliance.
 struct ForeignSettings {
   std::string scope_device{};  ///< the device whose poses are the scope's; empty: the only device that sends poses

@@ -71,8 +71,10 @@ Ending record(EventStream& stream, RecordingWriter& writer, const RecordOptions&
     if (frame && fs::space(options.out, unknown).available < kSpareBytes && !unknown)
       return {fmt::format("{}: the disk is full; free some, or choose another --out", options.out.string())};
     if (auto added = writer.add(**event); !added) return {added.error().what};
-    if (const int second = static_cast<int>(figures.seconds()); std::exchange(told_s, second) != second)
+    if (const int second = static_cast<int>(figures.seconds()); std::exchange(told_s, second) != second) {
       progress(fmt::format("{} s, {} frames, {} poses", second, figures.frames, figures.measurements));
+      if (auto there = writer.check_folder(); !there) return {there.error().what};
+    }
   }
   return {"it was interrupted", true};
 }
@@ -81,8 +83,13 @@ Verdict judge(const RecordingWriter& writer, const Ending& ending, bool finished
   const RecordingFigures& figures = writer.figures();
   Verdict verdict;
   const bool none = figures.frames == 0 && figures.measurements == 0;
-  verdict.add(none ? Grade::fail : ending.asked_for ? Grade::pass : Grade::marginal, "ended because " + ending.why);
-  if (!finished) verdict.add(Grade::marginal, "not all of its files could be completed");
+  const bool fail = none || !writer.damage().empty();
+  verdict.add(fail ? Grade::fail : ending.asked_for ? Grade::pass : Grade::marginal, "ended because " + ending.why);
+  for (const std::string& damage : writer.damage()) {
+    if (damage != ending.why) verdict.add(Grade::fail, damage);
+  }
+  if (!writer.damage().empty()) verdict.add(Grade::fail, "nobody signed it");
+  if (!finished && writer.damage().empty()) verdict.add(Grade::marginal, "not all of its files could be completed");
   if (none) return verdict;
   if (figures.frames == 0) verdict.add(Grade::marginal, "no frames came");
   if (figures.measurements == 0) verdict.add(Grade::marginal, "no poses came");

@@ -7,7 +7,9 @@
 #include <cctype>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
+#include "device/wire/foreign_feed.hpp"
 #include "drivers/system/next_line.hpp"
 #include "drivers/system/wait.hpp"
 #include "drivers/system/whole_file.hpp"
@@ -22,6 +24,9 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kLongestLine = std::size_t{1} << 20U;
 constexpr double kMostNumber = 1e15;  // a double counts so far by ones
+
+/// Of a time that was text in between, and in a double: frames are a thousand times farther apart.
+constexpr std::int64_t kRounding_ns = 1000;
 
 /// "StylusToTracker" -> "stylus".
 std::string bird_name(std::string transform) {
@@ -83,8 +88,9 @@ Result<void> RecordingReader::open_folder() {
     return Error{Errc::unsupported, fmt::format("{}: is of another version than {}", (path_ / kRecordingSheet).string(),
                                                 kRecordingVersion)};
   }
-  if (const auto ended = sheet.find("ended"); ended != sheet.end() && *ended == false)
-    notes_.emplace_back("it was cut short while it was recorded");
+  const auto ended = sheet.find("ended");
+  ended_whole_ = ended != sheet.end() && *ended == true;
+  if (ended != sheet.end() && *ended == false) notes_.emplace_back("it was cut short while it was recorded");
   return {};
 }
 
@@ -181,9 +187,9 @@ Result<void> RecordingReader::make_events(std::size_t number, const SequenceHead
   const bool countable = counted.problem.empty() && counted.value >= 0 && counted.value <= kMostNumber;
   frame.info.sequence = countable ? static_cast<std::uint64_t>(counted.value) : number;
   frame.info.acquired = frame.info.arrived = acquired;
-  // As RecordingWriter has them; PLUS says nothing of the kind.
-  if (const auto sigma = span_in(value_of(fields, "TimestampSigma")); sigma && sigma->ns >= 0)
-    frame.info.acquired_sigma = *sigma;
+  // As RecordingWriter has them; PLUS says nothing of the kind, and its times are no better than its server's.
+  const auto sigma = span_in(value_of(fields, "TimestampSigma"));
+  frame.info.acquired_sigma = sigma && sigma->ns >= 0 ? *sigma : wire::kForeignStampSigma;
   if (const ReadNumber sigma_mm = read_number(value_of(fields, "PoseSigmaMm"));
       sigma_mm.problem.empty() && sigma_mm.value >= 0)
     frame.info.pose.position_sigma_mm = sigma_mm.value;
@@ -217,6 +223,12 @@ Result<void> RecordingReader::open_video(const std::string& name, const wire::Vi
     if (!fs::exists(file, ignored)) continue;
     auto opened = SequenceReader::open(file);
     if (!opened) return opened.error();
+    // One that was cut short may lack more of its header than of its pixels.
+    if (opened->has_more() && ended_whole_)
+      return Error{Errc::bad_format,
+                   fmt::format("{}: has more pixels than its header tells of: its size or its channels are not those "
+                               "of the pixels; take a copy of the recording that is as it was written",
+                               file.string())};
     sequence_ = *std::move(opened);
     return {};
   }
@@ -231,12 +243,36 @@ Result<void> RecordingReader::open_video(const std::string& name, const wire::Vi
   return {};
 }
 
+Result<bool> RecordingReader::compare(const wire::VideoFrame& frame, std::size_t index) const {
+  const auto& frames = sequence_->header().frames;
+  const auto found = frames.find(index);
+  if (found == frames.end()) return true;
+  // Fields that are not there say nothing: earlier versions, or another program, may have left them away.
+  const std::string_view number = value_of(found->second, kFrameNumberField);
+  const std::string_view time = value_of(found->second, kTimestampField);
+  const auto acquired = span_in(time);
+  const bool same = (number.empty() || number == std::to_string(frame.info.sequence)) &&
+                    (time.empty() || (acquired && std::abs(acquired->ns - frame.info.acquired.ns) <= kRounding_ns));
+  const std::string_view status = value_of(found->second, kImageStatusField);
+  const auto shown = [](std::string_view text) { return text.empty() ? "?" : text.substr(0, 40); };
+  if (same) return status.empty() || status == kStatusOk;
+  return Error{Errc::bad_format,
+               fmt::format("{}: the pictures of {} are not those of its events: frame {} is number {} of {} s in {}, "
+                           "and there it is number {} of {} s; take a copy of the recording that is as it was written",
+                           path_.string(), video_, index, frame.info.sequence, seconds_text(frame.info.acquired.ns),
+                           kRecordingEvents, shown(number), shown(time))};
+}
+
 /// False: the frame is not there, or not whole.
 Result<bool> RecordingReader::fetch_pixels(wire::VideoFrame& frame, const FramePlace& place) {
   if (place.file != video_ || (!sequence_ && !film_)) {
     if (fs::path(place.file).has_parent_path())
       return Error{Errc::bad_value, fmt::format("{}: names a file elsewhere, {}", path_.string(), place.file)};
     if (auto opened = open_video(place.file, frame); !opened) return opened.error();
+  }
+  // The events of a lone sequence were made from it.
+  if (sequence_ && lines_.is_open()) {
+    if (const auto pictured = compare(frame, place.index); !pictured || !*pictured) return pictured;
   }
   auto rgb = sequence_ ? sequence_->read(place.index) : film_->read(place.index);
   if (!rgb && rgb.error().code == Errc::bad_format) return false;

@@ -50,6 +50,8 @@ class RecordingReader : public EventSource {
   Result<std::optional<EventOfLine>> take_of_sequence();
   Result<void> make_events(std::size_t number, const SequenceHeader::Fields& fields);
   Result<bool> fetch_next();
+  /// Refuses where the sequence says of a frame what its event does not say. False: it has no picture of it.
+  [[nodiscard]] Result<bool> compare(const wire::VideoFrame& frame, std::size_t index) const;
   Result<bool> fetch_pixels(wire::VideoFrame& frame, const FramePlace& place);
   Result<void> open_video(const std::string& name, const wire::VideoFrame& frame);
   /// When it is to be given; empty: as soon as it is asked for.
@@ -58,6 +60,7 @@ class RecordingReader : public EventSource {
 
   std::filesystem::path path_;
   Settings settings_;
+  bool ended_whole_ = false;  ///< its sheet says that it was not cut short
   std::ifstream lines_;
   std::size_t line_ = 0;
   calibration::Sha256 lines_sum_;

@@ -7,9 +7,7 @@
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <string>
-#include <system_error>
 #include <utility>
 
 #include "calibration/record/sha256.hpp"
@@ -17,6 +15,7 @@
 #include "drivers/identity/appliance_seal.hpp"
 #include "drivers/system/whole_file.hpp"
 #include "host/files/files_sha256.hpp"
+#include "host/recording/recording_files.hpp"
 #include "host/recording/recording_writer.hpp"
 
 namespace birdseye::host {
@@ -34,32 +33,11 @@ std::string sheet_sha256(nlohmann::json sheet) {
   return calibration::sha256_of(calibration::text_of_json(sheet));
 }
 
-/// All but the sheet.
-Result<std::set<std::string>> files_in(const fs::path& folder) {
-  std::set<std::string> out;
-  std::error_code error;
-  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    const std::string name = it->path().filename().string();
-    if (name != kRecordingSheet) out.insert(name);
-  }
-  if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be read; check its permissions", folder.string())};
-  return out;
-}
-
 }  // namespace
 
-Result<void> sign_recording(const fs::path& folder, nlohmann::json& sheet, const ThisMachine& machine) {
-  const auto files = files_in(folder);
-  if (!files) return files.error();
-  nlohmann::json sums = nlohmann::json::object();
-  for (const std::string& name : *files) {
-    const auto sum = files_sha256(folder / name);
-    if (!sum) return sum.error();
-    sums[name] = *sum;
-  }
-  sheet[kSums] = std::move(sums);
+void sign_recording(nlohmann::json& sheet, const std::map<std::string, std::string>& sums, const ThisMachine& machine) {
+  sheet[kSums] = sums;
   sheet[kSigned] = json_of_signature(machine.sign(kSessionRecordingFormat, sheet_sha256(sheet)));
-  return {};
 }
 
 Result<RecordingSeal> read_recording_seal(const fs::path& folder) {
@@ -78,12 +56,12 @@ Result<RecordingSeal> read_recording_seal(const fs::path& folder) {
     if (sheet.contains("rests_on")) sheet.at("rests_on").at("unsigned").get_to(out.rests_on);
     // Sums and signature are written together: with one alone, the other's name is damaged, and it was signed.
     if (!sheet.contains(kSigned) && !sheet.contains(kSums)) return out;
-    const auto there = files_in(folder);
+    const auto there = files_in_recording(folder);
     if (!there) return there.error();
     out.signature = calibration::signature_of_json(sheet.at(kSigned));
     const auto sums = sheet.at(kSums).get<std::map<std::string, std::string>>();
     for (const auto& [name, recorded] : sums) {
-      const bool here = there->contains(name);
+      const bool here = std::ranges::binary_search(*there, name);
       const auto sum = here ? files_sha256(folder / name) : Result<std::string>("");
       if (!sum) return sum.error();
       if (name == kRecordingEvents) out.events_sha256 = recorded;

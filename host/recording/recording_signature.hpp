@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -13,9 +14,9 @@ namespace birdseye::host {
 
 inline constexpr const char* kSessionRecordingFormat = "birdseye session recording";
 
-/// Enters the sums of the folder's files into the sheet of a recording that has ended, and this machine's signature
-/// over the sheet.
-Result<void> sign_recording(const std::filesystem::path& folder, nlohmann::json& sheet, const ThisMachine& machine);
+/// Enters the sums of what was written into each file of a recording that has ended, by name, into its sheet, and this
+/// machine's signature over the sheet.
+void sign_recording(nlohmann::json& sheet, const std::map<std::string, std::string>& sums, const ThisMachine& machine);
 
 /// Who says that they wrote a recording, and what of it is not as its sheet says.
 struct RecordingSeal {

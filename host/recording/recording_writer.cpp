@@ -1,6 +1,7 @@
 #include "host/recording/recording_writer.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include "calibration/record/strict_json.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/durable.hpp"
+#include "host/files/files_sha256.hpp"
 #include "host/files/frame_size.hpp"
 #include "host/files/sequence_header.hpp"
 #include "host/files/write_files.hpp"
@@ -35,11 +37,14 @@ Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const Recording
                  fmt::format("{}: holds a recording already; choose another --out", settings.folder.string())};
   }
   if (auto made = make_folder_durably(settings.folder); !made) return made.error();
+  auto files = RecordingFiles::open(settings.folder);
+  if (!files) return files.error();
   auto events = OutputFile::create(settings.folder / kRecordingEvents);
   if (!events) return events.error();
   auto tracker = SequenceWriter::create(settings.folder, kRecordingTracker, 0, 0);
   if (!tracker) return tracker.error();
-  std::unique_ptr<RecordingWriter> writer(new RecordingWriter(settings, *std::move(events), *std::move(tracker)));
+  std::unique_ptr<RecordingWriter> writer(
+      new RecordingWriter(settings, *std::move(files), *std::move(events), *std::move(tracker)));
   if (auto written = writer->write_sheet("it is being recorded, or was cut short", false); !written)
     return written.error();
   return writer;
@@ -52,6 +57,7 @@ Result<void> RecordingWriter::add_line(const wire::Event& event, const FramePlac
     return put;
   }
   events_at_ += line.size();
+  events_sum_.add({reinterpret_cast<const std::uint8_t*>(line.data()), line.size()});
   ++figures_.events;
   return {};
 }
@@ -245,38 +251,99 @@ Result<void> RecordingWriter::begin_film(double rate_hz) {
   return film_->add(*first.rgb);
 }
 
+Result<void> RecordingWriter::end_film() {
+  auto finished = film_->finish();
+  film_.reset();
+  whole_ = whole_ && finished;
+  if (!finished) return finished;
+  // The bytes are the encoder's: they are summed as soon as they are whole.
+  const std::string& name = figures_.videos.back().file;
+  const auto sum = files_sha256(settings_.folder / name);
+  whole_ = whole_ && sum;
+  if (!sum) return sum.error();
+  files_.wrote(name, *sum);
+  return {};
+}
+
+void RecordingWriter::keep_sums(SequenceWriter& sequence) {
+  const auto sums = sequence.sums();
+  if (!sums) damage_.push_back(sums.error().what);
+  if (!sums) return;
+  for (const auto& [name, sum] : *sums) files_.wrote(name, sum);
+}
+
 Result<void> RecordingWriter::end_video() {
-  if (waiting_) {
-    if (auto begun = begin_film(kUsualRateHz); !begun) return begun;
-  }
-  if (film_) {
-    auto finished = film_->finish();
+  // By its path nothing may be written any more, for that may be another folder now.
+  if (auto there = files_.check_folder(); !there) {
+    waiting_.reset();
     film_.reset();
-    return finished;
+    for (SequenceWriter& sequence : sequence_) (void)sequence.sync();
+    sequence_.clear();
+    return there;
   }
+  if (waiting_) {
+    auto begun = begin_film(kUsualRateHz);
+    whole_ = whole_ && begun;
+    if (!begun) return begun;
+  }
+  if (film_) return end_film();
   if (sequence_.empty()) return {};
+  SequenceWriter& sequence = sequence_[0];
+  const auto whole = sequence.check();
+  if (!whole) damage_.push_back(whole.error().what);
   bool joined = false;
-  if (!settings_.pair) {
-    const auto one = sequence_[0].join();
+  if (!settings_.pair && whole) {
+    const auto one = sequence.join();
     joined = one.has_value();
     // Two files are as good to read: not worth losing the recording for.
     if (!joined) notes_.push_back(one.error().what);
-    figures_.videos.back().file = sequence_[0].path().filename().string();
+    figures_.videos.back().file = sequence.path().filename().string();
   }
   // Joining has brought the one file onto the disk.
-  Result<void> synced = joined ? Result<void>() : sequence_[0].sync();
+  Result<void> synced = joined ? Result<void>() : sequence.sync();
+  whole_ = whole_ && synced;
+  if (whole) keep_sums(sequence);
   sequence_.clear();
   return synced;
 }
 
+void RecordingWriter::look_through_folder() {
+  for (const auto& whole : {events_.check(events_at_), tracker_.check()}) {
+    if (!whole) damage_.push_back(whole.error().what);
+  }
+  if (!damage_.empty()) return;  // and nothing is signed
+  files_.wrote(kRecordingEvents, events_sum_.hex());
+  keep_sums(tracker_);
+  if (damage_.empty()) damage_ = files_.damage();
+  auto others = files_.others();
+  if (!damage_.empty() || others.empty()) return;
+  constexpr std::size_t kMostNamed = 5;
+  const std::string more =
+      others.size() > kMostNamed ? fmt::format(" and {} more", others.size() - kMostNamed) : std::string();
+  others.resize(std::min(others.size(), kMostNamed));
+  notes_.push_back(
+      fmt::format("{} holds what this recording did not write, and what nobody signs: {}{}; move it away, or the "
+                  "recording is refused",
+                  settings_.folder.string(), fmt::join(others, ", "), more));
+}
+
 Result<void> RecordingWriter::finish(const std::string& why) {
   if (auto written = write_measurement(); !written) notes_.push_back(written.error().what);
+  const auto there = files_.check_folder();
+  if (!there) damage_.push_back(there.error().what);
   Result<void> ended = end_video();
-  if (!ended) notes_.push_back(ended.error().what);
+  if (!ended && there) notes_.push_back(ended.error().what);
   for (auto synced : {events_.sync(), tracker_.sync()}) {
+    whole_ = whole_ && synced;
     if (!synced) notes_.push_back(synced.error().what);
   }
-  if (auto written = write_sheet(why, true); !written) return written;  // and with it the names in the folder
+  if (!there) return there;
+  if (settings_.machine) look_through_folder();
+  if (auto written = write_sheet(why, true); !written) {  // and with it the names in the folder
+    notes_.push_back(written.error().what);
+    return written;
+  }
+  if (!damage_.empty()) return Error{Errc::bad_format, damage_.front()};
   return ended;
 }
 
@@ -297,6 +364,7 @@ Result<void> RecordingWriter::write_sheet(const std::string& why, bool ended) {
                 {"video", videos},
                 {"clock", {{"stamps", "the appliance's CLOCK_MONOTONIC, ns; in the sequences s"}}},
                 {"notes", notes_}};
+  if (!damage_.empty()) sheet["damage"] = damage_;
   if (ended) {
     sheet["made_utc"] = utc_now();
     sheet["seconds"] = figures_.seconds();
@@ -321,9 +389,7 @@ Result<void> RecordingWriter::write_sheet(const std::string& why, bool ended) {
     sheet["appliance_messages_shed"] = health_->messages_shed;
   }
   if (!rests_on_.empty()) sheet["rests_on"]["unsigned"] = rests_on_;
-  if (ended && settings_.machine) {
-    if (auto signed_now = sign_recording(settings_.folder, sheet, *settings_.machine); !signed_now) return signed_now;
-  }
+  if (ended && settings_.machine && damage_.empty() && whole_) sign_recording(sheet, files_.sums(), *settings_.machine);
   return write_file(settings_.folder / kRecordingSheet, calibration::text_of_json(sheet, 2) + "\n");
 }
 

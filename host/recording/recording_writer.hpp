@@ -7,11 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "calibration/record/sha256.hpp"
 #include "calibration/time/pose_history.hpp"
 #include "device/wire/messages.hpp"
 #include "drivers/identity/this_machine.hpp"
 #include "host/files/film.hpp"
 #include "host/recording/event_lines.hpp"
+#include "host/recording/recording_files.hpp"
 #include "host/recording/sequence_writer.hpp"
 
 namespace birdseye::host {
@@ -64,17 +66,25 @@ class RecordingWriter {
 
   /// Adds an event. An error ends the recording: what came before is kept, and finish() must follow.
   Result<void> add(const wire::Event& event);
-  /// Completes the files. why: the reason why the recording ended, in words.
+  /// Refuses, naming it, where the folder is not where it was any more: nothing is found there in the end.
+  [[nodiscard]] Result<void> check_folder() const { return files_.check_folder(); }
+  /// Completes the files, and signs what was written where it lies there as it was written. why: the reason why the
+  /// recording ended, in words.
   Result<void> finish(const std::string& why);
   [[nodiscard]] const RecordingFigures& figures() const { return figures_; }
   /// What is not as the settings asked for, in words.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+  /// What was removed, replaced or changed while it was recorded, in words, once it has ended: nobody signs it then.
+  [[nodiscard]] const std::vector<std::string>& damage() const { return damage_; }
   /// What its poses rest on that no known machine had signed; empty: on nothing such.
   [[nodiscard]] const std::string& rests_on() const { return rests_on_; }
 
  private:
-  RecordingWriter(RecordingSettings settings, OutputFile events, SequenceWriter tracker)
-      : settings_(std::move(settings)), events_(std::move(events)), tracker_(std::move(tracker)) {}
+  RecordingWriter(RecordingSettings settings, RecordingFiles files, OutputFile events, SequenceWriter tracker)
+      : settings_(std::move(settings)),
+        files_(std::move(files)),
+        events_(std::move(events)),
+        tracker_(std::move(tracker)) {}
   Result<void> add_line(const wire::Event& event, const FramePlace& place);
   Result<void> add_frame(const wire::VideoFrame& frame);
   Result<void> add_birds(const wire::Birds& birds);
@@ -85,13 +95,20 @@ class RecordingWriter {
   Result<void> begin_film(double rate_hz);
   Result<void> write_frame(const wire::VideoFrame& frame);
   Result<void> end_video();
+  Result<void> end_film();
+  /// Notes the sums of a sequence that has ended, or its damage.
+  void keep_sums(SequenceWriter& sequence);
+  /// Notes what does not lie in the folder as it was written, and what else lies there.
+  void look_through_folder();
   Result<void> write_sheet(const std::string& why, bool ended);
   void note_time(DeviceTime time);
   [[nodiscard]] std::string next_video() const;
   [[nodiscard]] SequenceWriter::Fields fields_of(const wire::VideoFrame& frame) const;
 
   RecordingSettings settings_;
+  RecordingFiles files_;
   OutputFile events_;
+  calibration::Sha256 events_sum_;
   SequenceWriter tracker_;
   std::uint64_t events_at_ = 0;
   std::vector<SequenceWriter> sequence_;  ///< one while frames come and are not compressed
@@ -104,7 +121,8 @@ class RecordingWriter {
   std::optional<wire::Health> health_;
   std::string rests_on_;
   RecordingFigures figures_;
-  std::vector<std::string> notes_;
+  std::vector<std::string> notes_, damage_;
+  bool whole_ = true;  ///< all of it is on the disk; else nobody signs it
 };
 
 }  // namespace birdseye::host

@@ -161,6 +161,7 @@ Result<void> SequenceReader::find_pixels() {
   const std::uint64_t there = size > pixels_->begin ? size - pixels_->begin : 0;
   // A compressed file may unpack to a thousand times its size: read() finds its end, frame by frame.
   whole_ = pixels_->compressed ? told_ : static_cast<std::size_t>(std::min<std::uint64_t>(told_, there / frame_bytes));
+  more_ = !pixels_->compressed && there > (told_ + 1) * frame_bytes;
   return {};
 }
 

@@ -28,6 +28,10 @@ class SequenceReader {
   /// that is known only once read() has come to its end; before, it is what the header tells.
   [[nodiscard]] std::size_t frames() const { return whole_; }
 
+  /// Whether the file has more pixels than the header tells of, by more than one frame that was cut short before it was
+  /// told: the header's size, or its channels, are not those of the pixels. Of a compressed file nothing is known.
+  [[nodiscard]] bool has_more() const { return more_; }
+
   /// The frame at index, RGB, rows from the top. In a compressed file all frames before it must be decompressed too,
   /// unless frames are read in order. Errc::bad_format: the file ends before it.
   Result<std::vector<std::uint8_t>> read(std::size_t index);
@@ -43,6 +47,7 @@ class SequenceReader {
   int width_px_ = 0, height_px_ = 0, channels_ = 1;
   bool mirrored_ = false, from_below_ = false;
   std::size_t told_ = 0, whole_ = 0;
+  bool more_ = false;
   std::unique_ptr<Pixels> pixels_;
 };
 

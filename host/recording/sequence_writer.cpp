@@ -1,77 +1,24 @@
 #include "host/recording/sequence_writer.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
-#include <cstring>
 
-#include "drivers/system/durable.hpp"
+#include "drivers/system/part_file.hpp"
 #include "host/files/sequence_header.hpp"
 
 namespace birdseye::host {
 
-namespace {
-
 namespace fs = std::filesystem;
 
-Error cannot(const fs::path& path, int fault) {
-  if (fault == ENOSPC || fault == EDQUOT || fault == EFBIG)
-    return {Errc::io,
-            fmt::format("{}: the disk has no room for more; free some, or choose another --out", path.string())};
-  return {Errc::unreadable, fmt::format("{}: cannot be written: {}", path.string(), std::strerror(fault))};
+namespace {
+
+std::span<const std::uint8_t> bytes_of(const std::string& text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
 }  // namespace
-
-Result<OutputFile> OutputFile::create(const fs::path& path) {
-  UniqueFd fd(::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
-  if (!fd) return cannot(path, errno);
-  return OutputFile(std::move(fd), path);
-}
-
-Result<void> OutputFile::put(std::uint64_t at, std::span<const std::uint8_t> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t put = ::pwrite(fd_.get(), bytes.data(), bytes.size(), static_cast<off_t>(at));
-    if (put > 0) {
-      bytes = bytes.subspan(static_cast<std::size_t>(put));
-      at += static_cast<std::uint64_t>(put);
-    } else if (put == 0 || errno != EINTR) {
-      return cannot(path_, put == 0 ? ENOSPC : errno);
-    }
-  }
-  return {};
-}
-
-Result<void> OutputFile::put(std::uint64_t at, const std::string& text) {
-  return put(at, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
-}
-
-void OutputFile::cut(std::uint64_t bytes) {
-  (void)!::ftruncate(fd_.get(), static_cast<off_t>(bytes));
-}
-
-Result<void> OutputFile::append(const fs::path& other, std::uint64_t at) {
-  const UniqueFd from(::open(other.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!from) return cannot(other, errno);
-  std::vector<std::uint8_t> chunk(std::size_t{4} << 20U);
-  for (;;) {
-    const ssize_t got = ::read(from.get(), chunk.data(), chunk.size());
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return cannot(other, errno);
-    if (got == 0) return {};
-    if (auto done = put(at, std::span(chunk).first(static_cast<std::size_t>(got))); !done) return done;
-    at += static_cast<std::uint64_t>(got);
-  }
-}
-
-Result<void> OutputFile::sync() {
-  if (::fsync(fd_.get()) != 0) return cannot(path_, errno);
-  return {};
-}
 
 std::string transform_name(const std::string& bird) {
   const auto to = bird.find("To");
@@ -122,14 +69,15 @@ Result<void> SequenceWriter::begin() {
       "ObjectType = Image\nNDims = 3\nAnatomicalOrientation = RAI\nBinaryData = True\nBinaryDataByteOrderMSB = False\n"
       "CenterOfRotation = 0 0 0\nCompressedData = False\nDimSize = ";
   count_at_ = text.size();
-  text += count_text();
-  text += "\nKinds = domain domain list\n";
+  head_ = text + count_text();
+  text = "\nKinds = domain domain list\n";
   text += pictures ? "ElementNumberOfChannels = 3\nElementType = MET_UCHAR\n" : "ElementType = MET_OTHER\n";
   text += "ElementSpacing = 1 1 1\nOffset = 0 0 0\nTransformMatrix = 1 0 0 0 1 0 0 0 1\n";
   text += pictures ? "UltrasoundImageOrientation = MFA\nUltrasoundImageType = RGB_COLOR\n"
                    : "UltrasoundImageOrientation = XX\nUltrasoundImageType = XX\n";
-  end_at_ = text.size();
-  return header_.put(0, text + end_text());
+  fields_sum_.add(bytes_of(text));
+  end_at_ = head_.size() + text.size();
+  return header_.put(0, head_ + text + end_text());
 }
 
 std::string SequenceWriter::count_text() const {
@@ -165,11 +113,16 @@ Result<void> SequenceWriter::add(const Fields& fields, std::span<const std::uint
     // The header's end was there before, and so there is room for it.
     (void)header_.put(end_at_, end_text());
     header_.cut(end_at_ + end_text().size());
+    if (!pixels_.empty()) pixels_[0].cut(frames_ * frame_bytes());
     return put;
   }
   end_at_ += text.size();
   ++frames_;
-  return header_.put(count_at_, count_text());
+  fields_sum_.add(bytes_of(text));
+  pixels_sum_.add(rgb);
+  auto put = header_.put(count_at_, count_text());
+  if (put) head_.replace(count_at_, std::string::npos, count_text());
+  return put;
 }
 
 Result<void> SequenceWriter::sync() {
@@ -179,33 +132,109 @@ Result<void> SequenceWriter::sync() {
   return header_.sync();
 }
 
+Result<void> SequenceWriter::check() const {
+  for (const OutputFile& file : pixels_) {
+    if (auto same = file.check(frames_ * frame_bytes()); !same) return same;
+  }
+  return header_.check(end_at_ + end_text().size());
+}
+
+void SequenceWriter::end_sums() {
+  if (!fields_sha256_.empty()) return;
+  fields_sha256_ = fields_sum_.hex();
+  pixels_sha256_ = pixels_sum_.hex();
+}
+
+/// Its count was written over with each frame, so that no sum of all of it could be kept.
+Result<void> SequenceWriter::read_header(const OutputFile::Take& take) const {
+  std::string head, end;
+  calibration::Sha256 fields;
+  std::uint64_t at = 0;
+  const auto read = header_.read([&](std::span<const std::uint8_t> bytes) {
+    const auto until = [&](std::uint64_t place) {
+      const auto some =
+          bytes.first(static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), place > at ? place - at : 0)));
+      bytes = bytes.subspan(some.size());
+      at += some.size();
+      return some;
+    };
+    for (const bool of_head : {true, false}) {
+      const auto some = until(of_head ? head_.size() : end_at_);
+      if (some.empty()) continue;
+      if (of_head) head.append(some.begin(), some.end());
+      if (!of_head) fields.add(some);
+      if (auto taken = take(some); !taken) return taken;
+    }
+    end.append(bytes.begin(), bytes.end());
+    at += bytes.size();
+    return at > end_at_ + end_text().size() ? Result<void>(changed_meanwhile(path_)) : Result<void>();
+  });
+  if (!read) return read;
+  if (head != head_ || end != end_text() || fields.hex() != fields_sha256_) return changed_meanwhile(path_);
+  return {};
+}
+
+Result<void> SequenceWriter::read_pixels(const OutputFile::Take& take) const {
+  calibration::Sha256 sum;
+  const auto read = pixels_[0].read([&](std::span<const std::uint8_t> bytes) {
+    sum.add(bytes);
+    return take(bytes);
+  });
+  if (!read) return read;
+  return sum.hex() == pixels_sha256_ ? Result<void>() : changed_meanwhile(pixels_[0].path());
+}
+
+Result<std::map<std::string, std::string>> SequenceWriter::sums() {
+  if (!joined_sha256_.empty()) return std::map<std::string, std::string>{{path_.filename().string(), joined_sha256_}};
+  end_sums();
+  calibration::Sha256 header;
+  const auto read = read_header([&](std::span<const std::uint8_t> bytes) {
+    header.add(bytes);
+    return Result<void>();
+  });
+  if (!read) return read.error();
+  header.add(bytes_of(end_text()));
+  std::map<std::string, std::string> out = {{path_.filename().string(), header.hex()}};
+  if (!pixels_.empty()) out[pixels_[0].path().filename().string()] = pixels_sha256_;
+  return out;
+}
+
 Result<void> SequenceWriter::join() {
   if (pixels_.empty()) return {};
   fs::path whole = path_;
   whole.replace_extension(".mha");
-  const fs::path part = whole.string() + ".part", raw = pixels_[0].path();
+  const fs::path raw = pixels_[0].path();
   std::error_code error;
   const std::uint64_t needed = frames_ * frame_bytes() + end_at_;
   const auto space = fs::space(path_.parent_path(), error);
   const auto stays = [&](const std::string& why) {
-    fs::remove(part, error);
     return Error{Errc::io, fmt::format("{} and {} stay two files: {}", path_.string(), raw.filename().string(), why)};
   };
   constexpr std::uint64_t kSpare = std::uint64_t{64} << 20U;
   if (!error && space.available < needed + kSpare)
     return stays(fmt::format("the disk has no room for both and one of {} MB", needed >> 20U));
-  auto file = OutputFile::create(part);
+  auto part = PartFile::make(whole);
+  if (!part) return stays(part.error().what);
+  auto file = OutputFile::create(part->path());
   if (!file) return stays(file.error().what);
-  auto done = file->append(path_, 0);
-  const std::string end = "ElementDataFile = LOCAL\n";
-  if (done) done = file->put(end_at_, end);
-  file->cut(end_at_ + end.size());
-  if (done) done = file->append(raw, end_at_ + end.size());
-  if (done) done = replace_durably(part, whole);
+  end_sums();
+  calibration::Sha256 sum;
+  std::uint64_t at = 0;
+  const auto put = [&](std::span<const std::uint8_t> bytes) {
+    auto written = file->put(at, bytes);
+    at += bytes.size();
+    sum.add(bytes);
+    return written;
+  };
+  auto done = read_header(put);
+  if (done) done = put(bytes_of("ElementDataFile = LOCAL\n"));
+  if (done) done = read_pixels(put);
+  if (done) done = part->put_durably();
   if (!done) return stays(done.error().what);
   fs::remove(path_, error);
   fs::remove(raw, error);
   path_ = whole;
+  joined_sha256_ = sum.hex();
   return {};
 }
 

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <span>
 #include <string>
 #include <utility>
@@ -9,30 +11,10 @@
 
 #include "calibration/base/result.hpp"
 #include "calibration/geometry/transform.hpp"
-#include "drivers/system/unique_fd.hpp"
+#include "calibration/record/sha256.hpp"
+#include "host/recording/output_file.hpp"
 
 namespace birdseye::host {
-
-/// A file that is written to its end, whole or with an error that says so; move-only.
-class OutputFile {
- public:
-  static Result<OutputFile> create(const std::filesystem::path& path);
-
-  /// All of bytes at that place, or what was there before it and why.
-  Result<void> put(std::uint64_t at, std::span<const std::uint8_t> bytes);
-  Result<void> put(std::uint64_t at, const std::string& text);
-  void cut(std::uint64_t bytes);
-  /// Appends so many bytes of another file from its beginning on.
-  Result<void> append(const std::filesystem::path& other, std::uint64_t at);
-  /// Brings what was written onto the disk, so that it is there whatever happens next.
-  Result<void> sync();
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  OutputFile(UniqueFd fd, std::filesystem::path path) : fd_(std::move(fd)), path_(std::move(path)) {}
-  UniqueFd fd_;
-  std::filesystem::path path_;
-};
 
 /// "scope" -> "ScopeToTracker", as PLUS names transforms: letters and digits, the first a capital. What is named as a
 /// transform already, as "StylusToReference", keeps its name.
@@ -56,8 +38,14 @@ class SequenceWriter {
   /// before it as they are.
   Result<void> add(const Fields& fields, std::span<const std::uint8_t> rgb);
   /// Joins header and pixels into one file, NAME.igs.mha, in place of the pair. Meanwhile the disk holds both: where
-  /// there is no room the pair stays, and the error says so. Nothing can be added afterwards.
+  /// there is no room the pair stays, and the error says so. Where the pair is not as it was written, it stays too.
+  /// Nothing can be added afterwards.
   Result<void> join();
+  /// Refuses, naming it, a file that is not where it was written any more, or has another size.
+  [[nodiscard]] Result<void> check() const;
+  /// The SHA-256 of what was written into each of its files, by name. Refuses a header that was changed meanwhile.
+  /// Nothing can be added afterwards.
+  Result<std::map<std::string, std::string>> sums();
   /// Brings what was added onto the disk.
   Result<void> sync();
   [[nodiscard]] std::size_t frames() const { return frames_; }
@@ -75,6 +63,11 @@ class SequenceWriter {
   [[nodiscard]] std::string count_text() const;
   [[nodiscard]] std::string end_text() const;
   [[nodiscard]] std::uint64_t frame_bytes() const;
+  void end_sums();
+  /// Gives the header's bytes but for its last line. Refuses, at their end, what is not as it was written.
+  Result<void> read_header(const OutputFile::Take& take) const;
+  /// The same of the pixels.
+  Result<void> read_pixels(const OutputFile::Take& take) const;
 
   std::filesystem::path path_;
   OutputFile header_;
@@ -82,6 +75,10 @@ class SequenceWriter {
   int width_px_, height_px_;
   std::uint64_t count_at_ = 0, end_at_ = 0;  ///< in the header: where DimSize's value is, and where the next frame goes
   std::size_t frames_ = 0;
+  std::string head_;  ///< of the header, as far as DimSize's value, which is written over with each frame
+  calibration::Sha256 fields_sum_, pixels_sum_;  ///< of the header behind it, but for its last line; and of the pixels
+  std::string fields_sha256_, pixels_sha256_;    ///< once nothing can be added any more
+  std::string joined_sha256_;                    ///< empty: it was not joined
 };
 
 }  // namespace birdseye::host

@@ -390,6 +390,27 @@ TEST(ReplayCommand, WhatNobodyKnownSignedIsUsedOnlyWhenAskedToAndTheVerdictSaysS
   expect_refused("birdseye", again, {"/r: its signature", "does not fit"}, out);
 }
 
+TEST(ReplayCommand, DrawsOverNoPictureOfAnotherSession) {
+  const Scratch scratch;
+  record(scratch / "r");
+  const std::string command = inputs(scratch, small_ct(scratch)) + " --registration " +
+                              scratch.file("reg.txt", kIdentityPose) + " --accept-unsigned --out ";
+  // Nobody signed it, so that the frames themselves have to tell.
+  nlohmann::json sheet = read_json(scratch / "r/recording.json");
+  sheet.erase("signed");
+  sheet.erase("sha256");
+  (void)scratch.file("r/recording.json", sheet.dump());
+  const auto good = run("birdseye", command + (scratch / "good").string());
+  EXPECT_EQ(good.code, 0) << good.output;
+  std::string video = contents_of(scratch / "r/video.igs.mha");
+  const std::string number = "Seq_Frame0000_FrameNumber = 7\n";
+  ASSERT_NE(video.find(number), std::string::npos);
+  (void)scratch.file("r/video.igs.mha", video.replace(video.find(number) + number.size() - 2, 1, "9"));
+  expect_refused("birdseye", command + (scratch / "o").string(), {"the pictures of video are not those of its events"});
+  EXPECT_TRUE(fs::exists(scratch / "good/overlay-000007.png"));
+  EXPECT_FALSE(fs::exists(scratch / "o/overlay-000007.png"));
+}
+
 TEST(ReplayCommand, FramesAfterTheCameraWasExchangedBearNoOverlay) {
   const Scratch scratch;
   wire::Calibration withdrawn;

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "host/recording/recording_reader.hpp"
@@ -17,8 +19,8 @@ namespace fs = std::filesystem;
 using testing::contents_of;
 using testing::Scratch;
 
-std::unique_ptr<RecordingWriter> begin(const fs::path& folder, const Authors& authors) {
-  auto writer = RecordingWriter::create({.folder = folder, .source = "test", .machine = authors.machine});
+std::unique_ptr<RecordingWriter> begin(const fs::path& folder, const Authors& authors, bool pair = false) {
+  auto writer = RecordingWriter::create({.folder = folder, .source = "test", .pair = pair, .machine = authors.machine});
   EXPECT_TRUE(writer);
   for (int n = 0; n < 3; ++n) {
     wire::VideoFrame frame;
@@ -34,6 +36,20 @@ std::unique_ptr<RecordingWriter> begin(const fs::path& folder, const Authors& au
 
 void record(const fs::path& folder, const Authors& authors) {
   EXPECT_TRUE(begin(folder, authors)->finish("the test is over"));
+}
+
+/// As an editor saves it, or whoever forges it: the name has another file from then on.
+void replace(const fs::path& file, const std::string& text) {
+  std::ofstream(file.string() + ".new") << text;
+  fs::rename(file.string() + ".new", file);
+}
+
+void change_within(const fs::path& file, std::streamoff at) {
+  std::fstream out(file, std::ios::in | std::ios::out | std::ios::binary);
+  out.seekg(at);
+  const char changed = static_cast<char>(out.get() ^ 1);
+  out.seekp(at);
+  out.put(changed);
 }
 
 std::string refusal(const fs::path& folder, const Authors& authors) {
@@ -95,6 +111,109 @@ TEST(RecordingSignature, NamesWhatWasChangedTakenAwayAndAdded) {
   EXPECT_EQ(seal->changed, std::vector<std::string>{"video.igs.mha"});
   EXPECT_EQ(seal->missing, std::vector<std::string>{"tracker.igs.mha"});
   EXPECT_EQ(seal->added, std::vector<std::string>{"notes.txt"});
+}
+
+TEST(RecordingSignature, WhatWasChangedOrTakenAwayWhileItWasRecordedIsNamedAndSignedByNobody) {
+  using Act = std::function<void(const fs::path&)>;
+  const Act forge = [](const fs::path& file) { replace(file, contents_of(file)); };
+  const Act lengthen = [](const fs::path& file) { std::ofstream(file, std::ios::app) << "{}\n"; };
+  const Act change = [](const fs::path& file) { change_within(file, 5); };
+  const Act change_later = [](const fs::path& file) {
+    change_within(file, static_cast<std::streamoff>(fs::file_size(file)) - 30);
+  };
+  const Act change_end = [](const fs::path& file) {
+    change_within(file, static_cast<std::streamoff>(fs::file_size(file)) - 3);
+  };
+  const Act remove = [](const fs::path& file) { fs::remove(file); };
+  const Authors own = Authors::for_once();
+  for (const char* file : {"events.jsonl", "tracker.igs.mha", "video.igs.mhd", "video.raw"}) {
+    int number = 0;
+    for (const Act& act : {forge, lengthen, change, change_later, change_end, remove}) {
+      for (const bool pair : {true, false}) {
+        if (pair && !std::string(file).starts_with("video")) continue;  // the other files are the same
+        const Scratch scratch;
+        const auto writer = begin(scratch / "r", own, pair);
+        act(scratch / "r" / file);
+        const std::string of = std::string(file) + (pair ? " of a pair, act " : ", act ") + std::to_string(number);
+        EXPECT_FALSE(writer->finish("the test is over")) << of;
+        ASSERT_EQ(writer->damage().size(), 1U) << of;
+        EXPECT_NE(writer->damage()[0].find((scratch / "r" / file).string() + ": was "), std::string::npos)
+            << of << "\n"
+            << writer->damage()[0];
+        const auto seal = read_recording_seal(scratch / "r");
+        ASSERT_TRUE(seal) << seal.error().what;
+        EXPECT_TRUE(seal->ended && !seal->signature) << of;
+        EXPECT_NE(refusal(scratch / "r", own).find("not signed"), std::string::npos) << of;
+        EXPECT_NE(contents_of(scratch / "r/recording.json").find("\"damage\""), std::string::npos) << of;
+      }
+      ++number;
+    }
+  }
+}
+
+TEST(RecordingSignature, WhatElseLiesInTheFolderIsNotSignedAndNamed) {
+  for (const bool pair : {false, true}) {
+    const Scratch scratch;
+    const Authors own = Authors::for_once();
+    const auto writer = begin(scratch / "r", own, pair);
+    for (const char* name : {"planted.txt", "video-2.igs.mha"}) (void)scratch.file(std::string("r/") + name, "mine");
+    EXPECT_TRUE(writer->finish("the test is over"));
+    EXPECT_TRUE(writer->damage().empty());
+    ASSERT_EQ(writer->notes().size(), 1U);
+    EXPECT_NE(writer->notes()[0].find("planted.txt, video-2.igs.mha"), std::string::npos) << writer->notes()[0];
+    const auto seal = read_recording_seal(scratch / "r");
+    ASSERT_TRUE(seal) << seal.error().what;
+    EXPECT_TRUE(seal->signature);
+    EXPECT_EQ(seal->added, (std::vector<std::string>{"planted.txt", "video-2.igs.mha"}));
+    EXPECT_TRUE(seal->changed.empty() && seal->missing.empty());
+    for (const char* name : {"planted.txt", "video-2.igs.mha"}) fs::remove(scratch / "r" / name);
+    EXPECT_EQ(refusal(scratch / "r", own), "") << "once it is moved away";
+  }
+}
+
+TEST(RecordingSignature, SumsWhatAPairAndSeveralVideosHold) {
+  for (const bool pair : {false, true}) {
+    const Scratch scratch;
+    const Authors own = Authors::for_once();
+    const auto writer = begin(scratch / "r", own, pair);
+    for (int n = 0; n < 2000; ++n) {
+      wire::VideoFrame other;
+      other.info.sequence = static_cast<std::uint64_t>(n) + 3;
+      other.info.acquired = other.info.arrived = {120'000'000LL + 1'000'000LL * n};
+      other.width_px = 64;
+      other.height_px = 48;
+      other.rgb = std::make_shared<const std::vector<std::uint8_t>>(3 * 64 * 48, static_cast<std::uint8_t>(n));
+      ASSERT_TRUE(writer->add(other));
+    }
+    ASSERT_TRUE(writer->finish("the test is over"));
+    EXPECT_EQ(refusal(scratch / "r", own), "") << "pieces of 4 MB";
+    const auto sums = nlohmann::json::parse(contents_of(scratch / "r/recording.json")).at("sha256");
+    EXPECT_EQ(sums.size(), pair ? 6U : 4U);
+  }
+}
+
+TEST(RecordingSignature, AFolderThatWasRemovedOrRenamedIsNamedAndNothingIsWrittenIntoAnother) {
+  for (const bool renamed : {false, true}) {
+    const Scratch scratch;
+    const Authors own = Authors::for_once();
+    const auto writer = begin(scratch / "r", own);
+    EXPECT_TRUE(writer->check_folder());
+    if (renamed) {
+      fs::rename(scratch / "r", scratch / "moved");
+      fs::create_directory(scratch / "r");
+    } else {
+      fs::remove_all(scratch / "r");
+    }
+    EXPECT_FALSE(writer->check_folder());
+    EXPECT_FALSE(writer->finish("the test is over"));
+    ASSERT_EQ(writer->damage().size(), 1U);
+    EXPECT_NE(writer->damage()[0].find((scratch / "r").string() + ": was removed or renamed"), std::string::npos);
+    EXPECT_TRUE(writer->notes().empty()) << writer->notes()[0];
+    EXPECT_EQ(fs::exists(scratch / "r"), renamed);
+    if (!renamed) continue;
+    EXPECT_TRUE(fs::is_empty(scratch / "r"));
+    EXPECT_NE(refusal(scratch / "moved", own).find("cut short"), std::string::npos);
+  }
 }
 
 /// Why it ends, read as far as it goes.
@@ -164,6 +283,52 @@ TEST(RecordingSignature, OneThatWasCutShortIsUnsignedAndSaysSo) {
   const auto accepted = admit_recording(scratch / "r", {own.machine, true});
   ASSERT_TRUE(accepted) << accepted.error().what;
   EXPECT_NE(accepted->doubt.find("not signed"), std::string::npos) << accepted->doubt;
+}
+
+/// An encoder that takes all and then fails: of the film there is nothing.
+TEST(RecordingSignature, OneWhoseFilmWasNotFinishedIsSignedByNobody) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "programs");
+  const fs::path program = scratch.file("programs/ffmpeg", "#!/bin/sh\necho no room left >&2\nwc -c >&2\nexit 1\n");
+  fs::permissions(program, fs::perms::owner_all);
+  const std::string before = ::getenv("PATH");
+  ::setenv("PATH", ((scratch / "programs").string() + ":" + before).c_str(), 1);
+  const Authors own = Authors::for_once();
+  const auto writer =
+      RecordingWriter::create({.folder = scratch / "r", .source = "test", .compressed = true, .machine = own.machine});
+  ASSERT_TRUE(writer);
+  for (int n = 0; n < 3; ++n) {
+    wire::VideoFrame frame;
+    frame.info.sequence = static_cast<std::uint64_t>(n);
+    frame.info.acquired = frame.info.arrived = {40'000'000LL * n};
+    frame.width_px = 64;
+    frame.height_px = 48;
+    frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(std::size_t{3} * 64 * 48, std::uint8_t{7});
+    EXPECT_TRUE((*writer)->add(frame));
+  }
+  const auto finished = (*writer)->finish("the test is over");
+  ::setenv("PATH", before.c_str(), 1);
+  ASSERT_FALSE(finished);
+  EXPECT_NE(finished.error().what.find("no room left"), std::string::npos) << finished.error().what;
+  EXPECT_NE(refusal(scratch / "r", own), "");
+  const auto sheet = nlohmann::json::parse(contents_of(scratch / "r" / kRecordingSheet));
+  EXPECT_FALSE(sheet.contains("signature")) << sheet;
+}
+
+/// What lies there is another's, and a link leads to one.
+TEST(RecordingSignature, AFileThatIsThereAlreadyIsNeitherEmptiedNorFollowed) {
+  const Scratch scratch;
+  (void)scratch.file("other.txt", "another's");
+  for (const bool link : {false, true}) {
+    const std::string folder = link ? "linked" : "there";
+    fs::create_directory(scratch / folder);
+    if (link) fs::create_symlink(scratch / "other.txt", scratch / folder / "tracker.igs.mha");
+    if (!link) (void)scratch.file(folder + "/tracker.igs.mha", "another's");
+    const auto writer = RecordingWriter::create({.folder = scratch / folder, .source = "test"});
+    ASSERT_FALSE(writer);
+    EXPECT_NE(writer.error().what.find("choose another --out"), std::string::npos) << writer.error().what;
+    EXPECT_EQ(contents_of(scratch / folder / "tracker.igs.mha"), "another's");
+  }
 }
 
 TEST(RecordingSignature, OfAnUnknownMachineIsUsedOnlyWhenAskedTo) {

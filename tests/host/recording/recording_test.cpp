@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "device/wire/foreign_feed.hpp"
 #include "drivers/system/clock.hpp"
 #include "host/files/film.hpp"
 #include "host/recording/event_lines.hpp"
@@ -200,7 +201,8 @@ TEST(Recording, ASequenceAloneIsPlayedToo) {
   EXPECT_NE(other.ending.what.find("PointerToTracker, ScopeToTracker"), std::string::npos) << other.ending.what;
 }
 
-/// Numbers that no time and no count can be: what they would be turned into is undefined.
+/// Numbers that no time and no count can be: what they would be turned into is undefined. A sigma that is none is as
+/// one that nobody told: the time is as uncertain as that of another program's server, never certain.
 TEST(Recording, ASequencesTimesAndNumbersThatCannotBeAreAbsent) {
   const Scratch scratch;
   record(scratch / "r", session(2));
@@ -219,7 +221,8 @@ TEST(Recording, ASequencesTimesAndNumbersThatCannotBeAreAbsent) {
   };
   for (const std::string number : {"1e38", "-1e38", "1e300"}) {
     EXPECT_EQ(first_frame(played_with("FrameNumber", number)).sequence, 0U) << number;
-    EXPECT_EQ(first_frame(played_with("TimestampSigma", number)).acquired_sigma.ns, 0) << number;
+    EXPECT_EQ(first_frame(played_with("TimestampSigma", number)).acquired_sigma.ns, wire::kForeignStampSigma.ns)
+        << number;
     const Played untimed = played_with("Timestamp", number);
     EXPECT_EQ(first_frame(untimed).sequence, frame(1, 16, 12).info.sequence) << "frame 0 is passed over";
     ASSERT_EQ(untimed.notes.size(), 1U);
@@ -423,6 +426,66 @@ TEST(Recording, DamageIsNamed) {
   expect({"holds no recording"});
   EXPECT_EQ(play(scratch / "none").ending.code, Errc::not_found);
   EXPECT_EQ(RecordingWriter::create({.folder = scratch / "r", .source = ""}).error().code, Errc::in_use);
+}
+
+/// Changes the header of a video, whose pixels stay as they are.
+void change_header(const fs::path& video, const std::string& from, const std::string& to) {
+  std::string text = contents_of(video);
+  const auto at = text.find(from);
+  ASSERT_NE(at, std::string::npos) << from;
+  std::ofstream(video) << text.replace(at, from.size(), to);
+}
+
+TEST(Recording, AVideoOfAnotherSessionIsNotPlayedWithTheEvents) {
+  const auto later = [](std::uint64_t frames, std::int64_t ns) {
+    auto events = session(4);
+    for (wire::Event& event : events) {
+      auto* f = std::get_if<wire::VideoFrame>(&event);
+      if (f == nullptr) continue;
+      f->info.sequence += frames;
+      f->info.acquired.ns += ns;
+    }
+    return events;
+  };
+  for (const bool pair : {false, true}) {
+    for (const auto& [frames, ns] : {std::pair{1U, 0}, {0U, 1'000'000}, {74U, 1'000'000'000}}) {
+      const Scratch scratch;
+      record(scratch / "r", session(4), {.pair = pair});
+      record(scratch / "other", later(frames, ns), {.pair = pair});
+      for (const char* file : {"video.igs.mha", "video.igs.mhd", "video.raw"}) {
+        if (fs::exists(scratch / "other" / file)) fs::rename(scratch / "other" / file, scratch / "r" / file);
+      }
+      const Played played = play(scratch / "r");
+      EXPECT_EQ(played.ending.code, Errc::bad_format);
+      EXPECT_NE(played.ending.what.find("the pictures of video are not those of its events: frame 0 is number 100 of "
+                                        "5000.000000123 s in events.jsonl"),
+                std::string::npos)
+          << played.ending.what;
+      for (const wire::Event& event : played.events) EXPECT_FALSE(std::holds_alternative<wire::VideoFrame>(event));
+    }
+  }
+}
+
+TEST(Recording, WhatAVideoDoesNotSayOfItsFramesIsNotComparedAndATextMayBeRounded) {
+  const Scratch scratch;
+  record(scratch / "r", session(3));
+  const std::string whole = contents_of(scratch / "r/video.igs.mha");
+  const auto frames_with = [&](const std::string& from, const std::string& to) {
+    std::ofstream(scratch / "r/video.igs.mha") << whole;
+    change_header(scratch / "r/video.igs.mha", from, to);
+    return play(scratch / "r").ending.what;
+  };
+  for (const auto& [from, to] : {std::pair{"Seq_Frame0001_FrameNumber", "Seq_Frame0001_OtherNumber"},
+                                 {"Seq_Frame0001_Timestamp ", "Seq_Frame0001_Stamp "},
+                                 {"Seq_Frame0001_ImageStatus", "Seq_Frame0001_OtherStatus"},
+                                 {"Seq_Frame0001_Timestamp = 5000.040000123", "Seq_Frame0001_Timestamp = 5000.04"}})
+    EXPECT_NE(frames_with(from, to).find("; 3 frames"), std::string::npos) << from << "\n" << frames_with(from, to);
+  const std::string invalid = frames_with("Seq_Frame0001_ImageStatus = OK", "Seq_Frame0001_ImageStatus = INVALID");
+  EXPECT_NE(invalid.find("2 frames are whole, 1 more"), std::string::npos) << invalid;
+  const std::string grey = frames_with("ElementNumberOfChannels = 3", "ElementNumberOfChannels = 1");
+  EXPECT_NE(grey.find("has more pixels than its header tells of"), std::string::npos) << grey;
+  const std::string untimed = frames_with("Seq_Frame0001_Timestamp = 5", "Seq_Frame0001_Timestamp = x");
+  EXPECT_NE(untimed.find("there it is number 101 of x"), std::string::npos) << untimed;
 }
 
 /// What such a number is turned into is undefined, and so is the difference of times that are farther apart than a

@@ -68,6 +68,20 @@ void expect_frames(const fs::path& path, std::size_t count) {
   }
 }
 
+TEST(SequenceFiles, WhatLiesBesideASequenceThatIsJoinedIsLeftAlone) {
+  const Scratch scratch;
+  SequenceWriter writer = write(scratch.path(), 2);
+  const std::string own = scratch.file("own.txt", "the user's own");
+  fs::create_symlink(own, scratch / "video.igs.mha.part");
+  const auto joined = writer.join();
+  ASSERT_TRUE(joined) << joined.error().what;
+  expect_frames(writer.path(), 2);
+  EXPECT_EQ(contents_of(own), "the user's own");
+  EXPECT_FALSE(fs::is_symlink(writer.path()));
+  EXPECT_TRUE(fs::is_symlink(scratch / "video.igs.mha.part"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), {}), 3) << "nothing else is left";
+}
+
 TEST(SequenceFiles, WhatIsWrittenIsReadBackAsAPairAndAsOneFile) {
   const Scratch scratch;
   SequenceWriter writer = write(scratch.path(), 4);
