@@ -191,6 +191,7 @@ Json json_of(const LatencyEntry& latency) {
   json["offset_ms"] = latency.offset_ms;
   json["offset_ci95_ms"] = {latency.ci95_low_ms, latency.ci95_high_ms};
   json["drift_ppm"] = latency.drift_ppm;
+  if (latency.camera_delay_ms) json["camera_delay_ms"] = *latency.camera_delay_ms;
   return json;
 }
 LatencyEntry latency_of(const Json& json) {
@@ -199,6 +200,7 @@ LatencyEntry latency_of(const Json& json) {
   json.at("offset_ms").get_to(latency.offset_ms);
   std::tie(latency.ci95_low_ms, latency.ci95_high_ms) = json.at("offset_ci95_ms").get<std::pair<double, double>>();
   json.at("drift_ppm").get_to(latency.drift_ppm);
+  if (json.contains("camera_delay_ms")) read_error_figure(json, "camera_delay_ms", latency.camera_delay_ms.emplace());
   if (!(latency.ci95_low_ms <= latency.ci95_high_ms) ||
       !is_measured_error(
           std::max({std::abs(latency.offset_ms), std::abs(latency.ci95_low_ms), std::abs(latency.ci95_high_ms)})))

@@ -64,6 +64,8 @@ struct TipEntry {
 struct LatencyEntry {
   Provenance provenance;
   double offset_ms = 0, ci95_low_ms = 0, ci95_high_ms = 0, drift_ppm = 0;
+  /// birdseyed's [camera] delay_ms when it was measured: with another the offset is another. Empty: nobody said it.
+  std::optional<double> camera_delay_ms = std::nullopt;
 };
 
 /// All that was found of one scope on one cart. Its text is JSON for people to read, with a checksum over the content:

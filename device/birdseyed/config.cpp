@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <set>
 
 #include "calibration/record/calibration_record.hpp"
 #include "calibration/record/field_map_file.hpp"
+#include "device/birdseyed/config_checks.hpp"
 #include "device/birdseyed/config_section.hpp"
 #include "device/birdseyed/wire_admission.hpp"
 #include "device/wire/server.hpp"
@@ -92,8 +94,7 @@ void read_birds(ConfigSection& section, Config& config) {
   if (!reference.empty() &&
       (names.empty() || reference == names.front() || std::find(names.begin(), names.end(), reference) == names.end()))
     section.fail("reference", fmt::format("\"{}\" is none of the names of birds after the scope's", reference));
-  if (const auto unnamed = std::find(names.begin(), names.end(), ""); unnamed != names.end())
-    section.fail("names", fmt::format("bird {} has no name", unnamed - names.begin() + 1));
+  if (const std::string fault = fault_of_bird_names(names); !fault.empty()) section.fail("names", fault);
 }
 
 void read_tracker(ConfigSection& section, Config& config) {
@@ -102,6 +103,8 @@ void read_tracker(ConfigSection& section, Config& config) {
   section.integer("baud", unit.baud, 2400, 115200);
   config.tracker.line.baud = unit.baud;
   section.integer("usb_latency_ms", config.tracker.line.usb_latency_ms, 1, 255);
+  if (const std::string fault = fault_of_socket(config.tracker.line.device, "unix:"); !fault.empty())
+    section.fail("device", fault);
   if (!config.tracker.line.device.empty()) {
     if (const auto sound = drivers::check_line(config.tracker.line); !sound)
       section.fail(drivers::is_serial_speed(unit.baud) ? "device" : "baud", sound.error().what);
@@ -139,7 +142,12 @@ void read_camera(ConfigSection& section, Config& config) {
   section.milliseconds("delay_ms", config.core.frame_clock.delay, 1000);
   section.milliseconds("exposure_ms", config.core.frame_clock.exposure, 1000);
   config.core.frame_clock.rate_hz = camera.rate_hz;
-  for (const std::string& fault : drivers::faults_of(camera)) section.fail("", fault);
+  if (const std::string fault = fault_of_socket(camera.source, "socket:"); !fault.empty())
+    section.fail("source", fault);
+  for (const std::string& fault : drivers::faults_of(camera)) {
+    if (!section.has("source") && fault.starts_with("source: ")) continue;  // that it is missing was said above
+    section.fail("", fault);
+  }
   if (std::int64_t{camera.width_px} * camera.height_px > drivers::kMostPixels)
     section.fail("width", "over 16 megapixels a frame, more than the wire carries");
 }
@@ -183,13 +191,12 @@ void read_gpio(ConfigSection& section, Config& config) {
 void read_wire(ConfigSection& section, Config& config) {
   section.text("bind", config.wire.bind);
   section.integer("port", config.wire.port, 0, 65535);
-  if (!wire::is_address(config.wire.bind))
-    section.fail("bind", fmt::format("\"{}\": give an IPv4 address of this machine, as 127.0.0.1", config.wire.bind));
+  if (const std::string fault = fault_of_bind(config.wire.bind); !fault.empty()) section.fail("bind", fault);
   section.flag("allow_plain", config.wire.allow_plain);
   config.core.notice = plain_notice(config.wire);
   section.flag("transforms", config.core.transforms);
   std::set<std::string> devices;
-  for (const std::string& bird : config.core.bird_names) {
+  for (const std::string& bird : std::set(config.core.bird_names.begin(), config.core.bird_names.end())) {
     if (!config.core.transforms || devices.insert(wire::transform_device(bird)).second) continue;
     section.fail("transforms", fmt::format("two birds' TRANSFORMs would both be called {}: give the birds names that "
                                            "differ in their first 11 letters, or set transforms = false",
@@ -210,6 +217,7 @@ void read_recording(ConfigSection& section, Config& config) {
   std::string folder;
   section.text("folder", folder, section.present());
   config.record.folder = folder;
+  if (const std::string fault = fault_of_folder(folder); !fault.empty()) section.fail("folder", fault);
   section.flag("frames", config.record.frames);
   section.number("most_gb", config.record.most_gb, 0.001, 100'000);
 }
@@ -279,6 +287,24 @@ void read_field_map(const std::string& path, bool accept_unsigned, ConfigSection
   core.field_unsigned = std::move(unknown->who);
 }
 
+/// A latency was measured with the delay of its day, and by another it would be taken off twice, or not whole.
+std::string delay_refusal(const std::string& path, const calibration::LatencyEntry& latency,
+                          const std::optional<Duration>& delay) {
+  constexpr double kSame_ms = 0.05;  // people write one decimal
+  const double now_ms = delay ? delay->seconds() * 1e3 : 0;
+  if (!latency.camera_delay_ms || std::abs(*latency.camera_delay_ms - now_ms) <= kSame_ms) return {};
+  return fmt::format(
+      "{}: the record's latency was measured with [camera] delay_ms = {:g}, which is {} now; set it back, or measure "
+      "again by birdseye calibrate latency --record",
+      path, *latency.camera_delay_ms, delay ? fmt::format("{:g}", now_ms) : "not set");
+}
+
+/// What the appliance will say once the instruments run.
+std::string unbound_words(const std::string& path, const calibration::CalibrationRecord& record) {
+  const char* const unknown = record.tracker.empty() ? "tracker" : record.camera.empty() ? "camera" : nullptr;
+  return unknown == nullptr ? "" : fmt::format("{}: {}", path, calibration::misfit(unknown, {}, {}));
+}
+
 void read_calibration_record(const std::string& path, bool accept_unsigned, ConfigSection& section, Config& config) {
   const auto text = read_whole_file(path, kMostRecordBytes);
   if (!text && text.error().code == Errc::unsupported)
@@ -290,15 +316,18 @@ void read_calibration_record(const std::string& path, bool accept_unsigned, Conf
                               calibration::kRecordFormat, record->sha256, record->signature});
   if (!unknown) return section.fail("record", unknown.error().with_context(path).what);
   config.core.calibration = *text;
-  if (accept_unsigned) return;
-  config.core.calibration_refused = std::move(unknown->refusal);
+  config.calibration_unbound = unbound_words(path, record->record);
+  std::string& refused = config.core.calibration_refused;
+  if (!accept_unsigned) refused = std::move(unknown->refusal);
   if (const std::string doubt = calibration::doubt_of(record->record);
-      config.core.calibration_refused.empty() && !doubt.empty()) {
-    config.core.calibration_refused = fmt::format(
+      !accept_unsigned && refused.empty() && !doubt.empty()) {
+    refused = fmt::format(
         "{}: the record rests on what no known machine signed ({}); calibrate again by what is signed, or use it all "
         "the same by [calibration] accept_unsigned = true",
         path, doubt);
   }
+  if (refused.empty() && record->record.latency)
+    refused = delay_refusal(path, *record->record.latency, config.core.frame_clock.delay);
 }
 
 void read_calibration(ConfigSection& section, Config& config) {
@@ -341,16 +370,18 @@ Result<Config> read_config(const std::filesystem::path& path) {
   const auto file = ConfigFile::parse(*text, path);
   if (!file) return file.error();
   ConfigFaults faults(path);
+  FirstFew unknown;
   for (const ConfigFile::Entry& entry : file->entries()) {
     const bool known = std::any_of(std::begin(kSections), std::end(kSections),
                                    [&](const auto& section) { return entry.name == section.first; });
-    if (!known || !entry.is_table) {
+    if ((!known || !entry.is_table) && unknown.takes(entry.line)) {
       faults.add(entry.line,
                  fmt::format("{}: unknown section; known are [tracker], [camera], [gpio], [wire], [pose], [record], "
                              "[calibration]",
                              entry.name));
     }
   }
+  if (unknown.others() > 0) faults.add(unknown.line(), fmt::format("and {} more unknown sections", unknown.others()));
   Config config;
   for (const auto& [name, read] : kSections) {
     ConfigSection section = file->section(faults, name);

@@ -41,6 +41,8 @@ struct Config {
   GpioConfig gpio;
   WireConfig wire;
   CoreSettings core;
+  /// Why no instrument fits the calibration record, with the remedy: it is bound to none. Empty: some may.
+  std::string calibration_unbound;
   RecordConfig record;
 };
 

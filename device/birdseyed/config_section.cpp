@@ -65,7 +65,11 @@ void ConfigSection::text(const char* key, std::string& value, bool required) {
   const auto found = find(key, required);
   if (found == nullptr) return;
   if (!found->is_string()) return fail(key, "needs text in quotes");
-  value = found->as_string().str;
+  const std::string& given = found->as_string().str;
+  // Of a NUL whoever opens what it names would see no more than what stands before it.
+  if (std::ranges::any_of(given, [](unsigned char c) { return c < ' ' || c == 0x7F; }))
+    return fail(key, "has a control character");
+  value = given;
 }
 
 void ConfigSection::number(const char* key, std::optional<double>& value, double low, double high) {
@@ -163,9 +167,16 @@ std::vector<ConfigSection> ConfigSection::tables(const char* key) {
 
 void ConfigSection::finish() {
   if (table_ == nullptr) return;
+  std::multimap<std::int64_t, std::string> by_line;  // the table itself is in no order
   for (const auto& [key, value] : table_->as_table()) {
-    if (known_.count(key) == 0) fail(key.c_str(), fmt::format("unknown key; known are {}", fmt::join(known_, ", ")));
+    if (known_.count(key) == 0) by_line.emplace(line_of(value), key);
   }
+  FirstFew unknown;
+  for (const auto& [line, key] : by_line) {
+    if (unknown.takes(line)) fail(key.c_str(), fmt::format("unknown key; known are {}", fmt::join(known_, ", ")));
+  }
+  if (unknown.others() > 0)
+    faults_->add(unknown.line(), fmt::format("[{}] and {} more unknown keys", name_, unknown.others()));
 }
 
 Result<ConfigFile> ConfigFile::parse(const std::string& text, const std::filesystem::path& path) {
@@ -188,6 +199,7 @@ Result<ConfigFile> ConfigFile::parse(const std::string& text, const std::filesys
 std::vector<ConfigFile::Entry> ConfigFile::entries() const {
   std::vector<Entry> entries;
   for (const auto& [name, value] : root_->as_table()) entries.push_back({name, line_of(value), value.is_table()});
+  std::ranges::sort(entries, {}, &Entry::line);
   return entries;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -27,6 +28,24 @@ class ConfigFaults {
  private:
   std::filesystem::path file_;
   std::multimap<std::int64_t, std::string> faults_;
+};
+
+/// The first ten of what may be many mistakes of one kind; the others are counted.
+class FirstFew {
+ public:
+  /// Whether the next one, of this line, is to be told.
+  bool takes(std::int64_t line) {
+    if (++count_ == kMost + 1) line_ = line;
+    return count_ <= kMost;
+  }
+  [[nodiscard]] std::size_t others() const { return count_ > kMost ? count_ - kMost : 0; }
+  /// Of the first of the others.
+  [[nodiscard]] std::int64_t line() const { return line_; }
+
+ private:
+  static constexpr std::size_t kMost = 10;
+  std::size_t count_ = 0;
+  std::int64_t line_ = 0;
 };
 
 /// A value as the reader of TOML has it.
@@ -60,7 +79,7 @@ class ConfigSection {
   void fail(const char* key, const std::string& why);
   /// Whether a fault of key was told.
   [[nodiscard]] bool failed(const std::string& key) const { return failed_.count(key) != 0; }
-  /// Names the keys that nobody asked for. To be called last.
+  /// Names the keys that nobody asked for, the first ten of them. To be called last.
   void finish();
 
  private:

@@ -1,5 +1,7 @@
 #include "device/birdseyed/core.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -17,7 +19,11 @@ using drivers::minibird::MiniBirdCounters;
 constexpr Duration kDoubtToldEvery = Duration::from_ms(1000);
 constexpr Duration kDoubtInStatusAfter = Duration::from_ms(100);  // a record that is lost now and then is none of it
 constexpr Duration kClockFaultStays = Duration::from_ms(1000);    // after the last frame that shows it
-constexpr std::size_t kMostWaitingFrames = 16;                    // 100 MB of 1080p, and over a quarter of a second
+constexpr Duration kClockFaultToldEvery = Duration::from_ms(10'000);
+// What `calibrate field` maps at most: a pose that may be off by more is no better than one without a map. Maps that
+// were made before that limit have such places.
+constexpr double kMostFieldSigmaMm = 2.5;
+constexpr std::size_t kMostWaitingFrames = 16;  // 100 MB of 1080p, and over a quarter of a second
 
 void add(MiniBirdCounters& sum, const MiniBirdCounters& more) {
   sum.measurements += more.measurements;
@@ -117,7 +123,14 @@ BirdReading Core::corrected(const BirdReading& reading) {
     return out;
   }
   const auto corrected = settings_.field->correct({*pose->rotation, *pose->position_mm});
-  if (corrected) {
+  if (corrected && !(corrected->sigma_mm <= kMostFieldSigmaMm)) {
+    ++unmapped_;
+    out.pose.reset();
+    const Eigen::Vector3d& p = *pose->position_mm;
+    out.doubt = fmt::format("at {:.0f}, {:.0f}, {:.0f} mm the map of the field is sure to {:.1f} mm, of at most {:.1f}",
+                            p.x(), p.y(), p.z(), corrected->sigma_mm, kMostFieldSigmaMm);
+    out.kind = DoubtKind::unmapped;
+  } else if (corrected) {
     out.pose->rotation = corrected->tracker_from_sensor.rotation();
     out.pose->position_mm = corrected->tracker_from_sensor.translation();
   } else {
@@ -175,8 +188,14 @@ void Core::note(const FrameCame& came) {
   correct_latency(frames_.back());
   const FrameClock::Time& time = frames_.back().time;
   if (time.ahead) {
-    stamps_ahead_ = frame.arrived;
-    board_.set_clock_fault(time.reason);
+    // Stamps that jitter would otherwise have it told anew with each frame.
+    const bool first = !std::exchange(stamps_ahead_, frame.arrived);
+    const bool alike = time.ahead->ns <= 2 * ahead_told_.ns && ahead_told_.ns <= 2 * time.ahead->ns;
+    if (first || (!alike && frame.arrived > ahead_told_at_ + kClockFaultToldEvery)) {
+      ahead_told_ = *time.ahead;
+      ahead_told_at_ = frame.arrived;
+      board_.set_clock_fault(time.reason);
+    }
   } else if (stamps_ahead_ && frame.arrived > *stamps_ahead_ + kClockFaultStays) {
     stamps_ahead_.reset();
     board_.set_clock_fault("");

@@ -26,7 +26,7 @@ struct CoreSettings {
   FrameClock::Settings frame_clock;
   std::string notice;                          ///< said in STATUS beside what is amiss, of which it is none
   std::string calibration;                     ///< a calibration record's text; empty: none
-  std::string calibration_refused;             ///< why it is not used: nobody known signed it; empty: it may be
+  std::string calibration_refused;             ///< why it is not used, whatever is here; empty: it may be
   std::optional<calibration::FieldMap> field;  ///< corrects every pose; poses outside the mapped volume are doubted
   calibration::Identity field_of;  ///< the tracker whose field that is; of another every pose is doubted. Empty: any
   std::string field_refused;       ///< why the map is not used, and every pose doubted: nobody known signed it
@@ -95,6 +95,8 @@ class Core {
   PoseHistory scope_;
   FrameClock frame_clock_;
   std::optional<DeviceTime> stamps_ahead_;  ///< when the newest frame came whose stamp lay ahead of the clock
+  Duration ahead_told_;                     ///< how far, as STATUS has it
+  DeviceTime ahead_told_at_;
   CalibrationGuard calibration_;
   std::deque<TimedFrame> frames_;  ///< waiting for poses
   std::uint64_t frames_seen_ = 0, frames_lost_ = 0, frames_repeated_ = 0;

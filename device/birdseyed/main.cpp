@@ -167,6 +167,7 @@ int main(int argc, char** argv) {
   CLI::App* const pairing =
       app.add_subcommand("pair", "introduce this machine and a host by a code that people compare");
   pairing->fallthrough();  // to --config
+  pairing->footer("Needs --config FILE too, whose [wire] bind is the address to wait on.");
   pairing->add_option("--port", pair_options.port, "to wait on (default 18945)")->check(CLI::Range(0, 65535));
   pairing->add_option("--name", pair_options.name, "by which to know the host (default: as it calls itself)");
   return run_program<CLI::ParseError>(app, argc, argv, [&] {
@@ -174,14 +175,16 @@ int main(int argc, char** argv) {
     if (check_only) {
       const auto config = device::read_config(config_path);
       if (!config) return refuse(config.error());
-      for (const std::string& refused : {config->core.calibration_refused, config->core.field_refused}) {
+      const std::string& record_refused =
+          config->core.calibration_refused.empty() ? config->calibration_unbound : config->core.calibration_refused;
+      for (const std::string& refused : {record_refused, config->core.field_refused}) {
         if (!refused.empty()) print_error("birdseyed", refused);
       }
       if (const std::string& who = config->core.field_unsigned; !who.empty())
         print_error("birdseyed", fmt::format("UNSIGNED: the map of the field is {}", who));
-      const char* without = !config->core.field_refused.empty()         ? ", but no pose will be published"
-                            : !config->core.calibration_refused.empty() ? ", but the record will not be used"
-                                                                        : "";
+      const char* without = !config->core.field_refused.empty() ? ", but no pose will be published"
+                            : !record_refused.empty()           ? ", but the record will not be used"
+                                                                : "";
       print_line(fmt::format("{}: sound{}", config_path.string(), without));
       if (const std::string who = device::admission_words(config->wire); !who.empty()) print_line(who);
       return 0;

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -25,7 +26,7 @@ constexpr int kMostOfOneName = 1000;
 
 class DiskFile : public RecordFile {
  public:
-  DiskFile(UniqueFd fd, const fs::path& path) : fd_(std::move(fd)), folder_(path.parent_path()) {}
+  DiskFile(UniqueFd fd, const fs::path& path) : fd_(std::move(fd)), path_(path), folder_(path.parent_path()) {}
 
   int write(std::span<const std::uint8_t> bytes) override {
     while (!bytes.empty()) {
@@ -37,6 +38,7 @@ class DiskFile : public RecordFile {
     return 0;
   }
   int sync() override {
+    if (!has_its_name()) return ENOENT;
     if (::fdatasync(fd_.get()) != 0 && errno != EINVAL) return errno;  // EINVAL: it cannot
     // Its name with it, once: what is on the disk without a name is lost all the same.
     if (named_) return 0;
@@ -46,8 +48,19 @@ class DiskFile : public RecordFile {
   }
 
  private:
+  /// Whoever has removed the file, or put another in its place, would not find what is written from then on. One that
+  /// was moved is still there.
+  [[nodiscard]] bool has_its_name() const {
+    struct stat ours {
+    }, there{};
+    if (::fstat(fd_.get(), &ours) != 0) return true;  // which says nothing of its name
+    if (ours.st_nlink == 0) return false;
+    if (::lstat(path_.c_str(), &there) != 0) return true;
+    return ours.st_dev == there.st_dev && ours.st_ino == there.st_ino;
+  }
+
   UniqueFd fd_;
-  fs::path folder_;
+  fs::path path_, folder_;
   bool named_ = false;
 };
 

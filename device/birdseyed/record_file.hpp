@@ -19,6 +19,7 @@ class RecordFile {
   /// Writes all bytes: 0, or errno.
   virtual int write(std::span<const std::uint8_t> bytes) = 0;
   /// Brings everything written so far onto the disk, so that a power cut does not lose it: 0, or errno.
+  /// ENOENT: the file was removed, or another has its name.
   virtual int sync() = 0;
 };
 

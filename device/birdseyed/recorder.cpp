@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <deque>
 #include <mutex>
 #include <optional>
@@ -194,7 +195,8 @@ void Recorder::Writer::sync() {
   // What the kernel could not write it may have thrown away, and it says so once.
   if (const int failed = file_->sync(); failed != 0) {
     whole_ = false;
-    end(fmt::format("ended, the disk has lost some of it ({})", words(failed)));
+    end(failed == ENOENT ? "ended, somebody has removed or replaced its file; restart birdseyed to begin another"
+                         : fmt::format("ended, the disk has lost some of it ({})", words(failed)));
   }
   synced_ = device_now();
 }

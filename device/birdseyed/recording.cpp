@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <vector>
 
 #include "calibration/record/strict_json.hpp"
@@ -218,6 +219,11 @@ std::string fault_of(const CoreSettings& settings) {
     return fmt::format("{} names of birds; there are 1 to {}", names.size(), kMostBirds);
   if (std::any_of(names.begin(), names.end(), [](const std::string& name) { return name.empty(); }))
     return "a bird without a name";
+  std::set<std::string> as_sent;
+  for (const std::string& name : names) {
+    if (!as_sent.insert(name.substr(0, wire::kMostBirdNameBytes)).second)
+      return "two birds of one name, by the first 20 letters, which are all that hosts are told";
+  }
   const PoseHistory::Settings& pose = settings.pose;
   if (pose.capacity == 0 || !is_limit(pose.acceleration_mm_s2)) return "limits of poses that are none";
   for (const Duration wait :

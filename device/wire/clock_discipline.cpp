@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sys/timex.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -15,8 +16,9 @@ ClockDiscipline decode_discipline(const timex& reading, int state) {
   const auto status = static_cast<unsigned>(reading.status);
   // TIME_ERROR also comes for a lost pulse per second; STA_UNSYNC is what says that nobody disciplines the clock.
   discipline.synchronised = state != TIME_ERROR && (status & STA_UNSYNC) == 0;
-  discipline.max_error = {reading.maxerror * 1000};
-  discipline.est_error = {reading.esterror * 1000};
+  // The kernel keeps them as it was told: what is below zero is nobody's error, and hosts refuse it.
+  discipline.max_error = {std::max(reading.maxerror, 0L) * 1000};
+  discipline.est_error = {std::max(reading.esterror, 0L) * 1000};
   discipline.tai_known = reading.tai != 0;
   discipline.source = fmt::format("adjtimex: {}{}", discipline.synchronised ? "synchronised" : "not synchronised",
                                   discipline.tai_known ? fmt::format(", TAI-UTC {} s", reading.tai) : "");

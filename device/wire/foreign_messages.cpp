@@ -94,9 +94,20 @@ Result<ForeignPoses> read_list(const Header& header, ByteView content, std::size
   if (content.size() % element_bytes != 0) return damaged(header, "is cut short");
   const bool quaternions = element_bytes == IGTL_QTDATA_ELEMENT_SIZE;
   ForeignPoses poses;
+  std::set<std::string> names;
   for (; !content.empty(); content = content.subspan(element_bytes)) {
     const auto numbers = content.subspan(22, element_bytes - 22);
-    add(poses, name_at(content, header.device), quaternions ? pose_of_quaternion(numbers) : pose_of_matrix(numbers));
+    const std::string name = name_at(content, header.device);
+    if (names.insert(name).second) {
+      add(poses, name, quaternions ? pose_of_quaternion(numbers) : pose_of_matrix(numbers));
+    } else {
+      poses.doubled.insert(name);
+    }
+  }
+  // Nobody could say which of the two is that tool's.
+  for (const std::string& name : poses.doubled) {
+    if (std::erase_if(poses.birds, [&](const Bird& bird) { return bird.name == name; }) > 0)
+      poses.no_poses.push_back(name);
   }
   return poses;
 }

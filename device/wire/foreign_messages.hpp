@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <variant>
 
 #include "device/wire/igtl_bytes.hpp"
@@ -27,6 +28,7 @@ struct ForeignPoses {
   /// Tools without a pose, out of sight for example: their matrix or quaternion is no rotation, or the meta data call
   /// it invalid.
   std::vector<std::string> no_poses;
+  std::set<std::string> doubled;  ///< of these two stand in the list, and so neither has a pose
 };
 
 /// STATUS, which some send to keep the connection alive too. words: what is wrong; empty: nothing.

@@ -12,6 +12,8 @@
 /// The bytes that every OpenIGTLink message has, and its checksum.
 namespace birdseye::wire {
 
+/// Of a bird's name as much as TDATA has room for.
+inline constexpr std::size_t kMostBirdNameBytes = 20;
 inline constexpr std::size_t kHeaderBytes = 58;
 
 /// The protocol's checksum: CRC-64 of ECMA-182, by ISA-L, which is thirty times as fast as the protocol library's own.

@@ -1,6 +1,8 @@
 #include "device/wire/pairing.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <openssl/evp.h>
 #include <openssl/rand.h>
 
@@ -8,13 +10,17 @@
 #include <array>
 #include <cctype>
 #include <cstdio>
-#include <fstream>
+#include <iterator>
+#include <list>
+#include <optional>
+#include <set>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "device/wire/tcp_link.hpp"
 #include "drivers/identity/known_keys.hpp"
-#include "drivers/system/durable.hpp"
+#include "drivers/system/part_file.hpp"
 #include "drivers/system/yes_or_no.hpp"
 
 namespace birdseye::wire {
@@ -22,6 +28,8 @@ namespace birdseye::wire {
 namespace {
 
 constexpr std::size_t kNameBytes = 64;
+constexpr Duration kFirstMessage = Duration::from_ms(1000);  // a client sends it as soon as it is connected
+constexpr std::size_t kMostNewcomers = 16, kMostNamed = 5;
 constexpr Duration kExchange = Duration::from_ms(10'000);  // which no person takes part in
 constexpr std::uint8_t kYes = 'y', kNo = 'n';
 constexpr const char* kOwn = "own";  // by which this machine's certificate is kept beside the others'
@@ -101,11 +109,9 @@ Result<Card> exchange_as_client(TlsLink& link, const Card& own, Deadline deadlin
   return others;
 }
 
-Result<Card> exchange_as_server(TlsLink& link, const Card& own, Deadline deadline, bool* begun) {
-  Sha256 promised{};
+/// promised: what the client has committed itself to.
+Result<Card> exchange_as_server(TlsLink& link, const Sha256& promised, const Card& own, Deadline deadline) {
   Card others{};
-  if (auto got = receive(link, promised, deadline); !got) return got.error();
-  if (begun != nullptr) *begun = true;
   if (auto sent = send(link, own, deadline); !sent) return sent.error();
   if (auto got = receive(link, others, deadline); !got) return got.error();
   if (sha256_of({others}) == promised) return others;
@@ -113,15 +119,14 @@ Result<Card> exchange_as_server(TlsLink& link, const Card& own, Deadline deadlin
                "the other machine is not what it began as: do not pair it, and look who is on this network"};
 }
 
-}  // namespace
-
-Result<Introduction> introduce(TlsLink& link, TlsLink::Side side, const std::string& own_name, Deadline deadline,
-                               bool* begun) {
+/// promised: as a server, what the client has committed itself to; as a client nothing.
+Result<Introduction> introduce_after(const std::optional<Sha256>& promised, TlsLink& link, const std::string& own_name,
+                                     Deadline deadline) {
   const auto own = card_of(own_name);
   if (!own) return own.error();
-  const bool client = side == TlsLink::Side::client;
+  const bool client = !promised;
   const auto others =
-      client ? exchange_as_client(link, *own, deadline) : exchange_as_server(link, *own, deadline, begun);
+      client ? exchange_as_client(link, *own, deadline) : exchange_as_server(link, *promised, *own, deadline);
   if (!others) return others.error();
   const Card& of_client = client ? *own : *others;
   const Card& of_server = client ? *others : *own;
@@ -130,6 +135,17 @@ Result<Introduction> introduce(TlsLink& link, TlsLink::Side side, const std::str
   const Sha256 hash =
       sha256_of({link.secret("EXPORTER-birdseye-pairing"), of_client, of_server, client_key.bytes, server_key.bytes});
   return Introduction{code_of(hash), name_of(*others), link.peer_key()};
+}
+
+}  // namespace
+
+Result<Introduction> introduce(TlsLink& link, TlsLink::Side side, const std::string& own_name, Deadline deadline,
+                               bool* begun) {
+  if (side == TlsLink::Side::client) return introduce_after(std::nullopt, link, own_name, deadline);
+  Sha256 promised{};
+  if (auto got = receive(link, promised, deadline); !got) return got.error();
+  if (begun != nullptr) *begun = true;
+  return introduce_after(promised, link, own_name, deadline);
 }
 
 Result<void> agree(TlsLink& link, bool yes, Deadline deadline) {
@@ -155,15 +171,6 @@ Result<std::shared_ptr<const Tls>> pairing_tls(const MachineKey& key) {
 
 namespace {
 
-Result<void> write_text(const std::filesystem::path& path, const std::string& text) {
-  const std::filesystem::path part = path.string() + ".part";
-  std::ofstream out(part, std::ios::binary | std::ios::trunc);
-  out << text;
-  out.close();
-  if (!out) return Error{Errc::unreadable, fmt::format("{}: cannot be written; check the folder", path.string())};
-  return replace_durably(part, path);
-}
-
 /// By which the other machine is to be known here: the name that it has here already, the one that was asked for, or
 /// what it calls itself, with a number behind it where another machine has that name.
 Result<std::string> name_for(const Introduction& introduction, const PairingPlan& plan, const KnownKeys& known) {
@@ -188,10 +195,98 @@ Result<Paired> settle(TlsLink& link, const Introduction& introduction, const Pai
   // The certificates first: they let nobody in, and what is in the known keys is whole whenever a machine goes down.
   for (const auto& [file, text] :
        {std::pair(kOwn, link.own_certificate()), std::pair(name->c_str(), link.peer_certificate())}) {
-    if (auto written = write_text(plan.folder / (std::string(file) + ".crt"), text); !written) return written.error();
+    if (auto written = write_durably(plan.folder / (std::string(file) + ".crt"), text); !written)
+      return written.error();
   }
   if (auto added = known->add(*name, introduction.key); !added) return added.error();
   return Paired{*name, introduction.key};
+}
+
+/// Those who have come and have not committed themselves yet. They are waited for all at once: who comes and says
+/// nothing is in nobody's way.
+class Newcomers {
+ public:
+  explicit Newcomers(Listener& listener) : listener_(listener) {}
+
+  struct Committed {
+    std::unique_ptr<Link> owner;
+    TlsLink* link = nullptr;
+    std::string address;
+    Sha256 promised{};
+  };
+  /// The first who commits itself; empty: nobody by the deadline.
+  std::optional<Committed> wait(Deadline deadline);
+  /// The addresses of those who came and did not, in words; empty: there were none.
+  [[nodiscard]] std::string silent_words() const;
+
+ private:
+  struct Newcomer {
+    Committed entry;
+    std::size_t have = 0;
+    Deadline until;
+  };
+
+  void take(std::unique_ptr<Link> accepted);
+  /// Whether all of its first message is there. An error: it has gone, or has been silent for too long.
+  static Result<bool> read(Newcomer& newcomer, bool readable);
+  void send_away(const Newcomer& newcomer);
+
+  Listener& listener_;
+  std::list<Newcomer> waiting_;
+  std::set<std::string> silent_;
+};
+
+void Newcomers::take(std::unique_ptr<Link> accepted) {
+  auto* const link = dynamic_cast<TlsLink*>(accepted.get());
+  if (link == nullptr) return;
+  std::string address = peer_of(UniqueFd(::fcntl(link->fd(), F_DUPFD_CLOEXEC, 0)));
+  waiting_.push_back({{std::move(accepted), link, std::move(address), {}}, 0, Deadline::after(kFirstMessage)});
+}
+
+Result<bool> Newcomers::read(Newcomer& newcomer, bool readable) {
+  Sha256& promised = newcomer.entry.promised;
+  if (readable) {
+    const auto got = newcomer.entry.link->read_some(std::span(promised).subspan(newcomer.have));
+    if (!got) return gone();
+    newcomer.have += *got;
+  }
+  if (newcomer.have == promised.size()) return true;
+  if (newcomer.until.passed()) return late();
+  return false;
+}
+
+void Newcomers::send_away(const Newcomer& newcomer) {
+  if (silent_.size() < kMostNamed) silent_.insert(newcomer.entry.address);
+}
+
+std::optional<Newcomers::Committed> Newcomers::wait(Deadline deadline) {
+  do {
+    std::vector<LinkWatch> watches;
+    Deadline look = deadline;
+    for (const Newcomer& newcomer : waiting_) {
+      watches.push_back({.link = newcomer.entry.link});
+      look = std::min(look, newcomer.until);
+    }
+    const bool somebody = listener_.wait(watches, waiting_.size() < kMostNewcomers, look);
+    auto watch = watches.begin();
+    for (auto newcomer = waiting_.begin(); newcomer != waiting_.end(); ++watch) {
+      const auto committed = watch->broken ? Result<bool>(gone()) : read(*newcomer, watch->readable);
+      if (committed && *committed) {
+        Committed found = std::move(newcomer->entry);
+        waiting_.clear();
+        return found;
+      }
+      if (!committed) send_away(*newcomer);
+      newcomer = committed ? std::next(newcomer) : waiting_.erase(newcomer);
+    }
+    if (somebody) take(listener_.accept());
+  } while (!deadline.passed());
+  for (const Newcomer& newcomer : waiting_) send_away(newcomer);
+  return std::nullopt;
+}
+
+std::string Newcomers::silent_words() const {
+  return silent_.empty() ? "" : fmt::format("; {} came and did not begin", fmt::join(silent_, ", "));
 }
 
 }  // namespace
@@ -208,18 +303,13 @@ Result<Paired> pair_as_server(const PairingPlan& plan, const std::string& bind_a
   auto listener = listen_tcp(bind_address, port, std::move(admission));
   if (!listener) return listener.error();
   if (listening) listening((*listener)->port());
-  while (!deadline.passed()) {
-    if (!(*listener)->wait({}, true, deadline)) continue;
-    const auto accepted = (*listener)->accept();
-    auto* const link = dynamic_cast<TlsLink*>(accepted.get());
-    if (link == nullptr) continue;
-    bool begun = false;
-    const auto introduction =
-        introduce(*link, TlsLink::Side::server, machine_name(), std::min(deadline, Deadline::after(kExchange)), &begun);
-    if (introduction) return settle(*link, *introduction, plan, *key, deadline);
-    if (begun) return introduction.error();
-  }
-  return Error{Errc::timeout, "nobody came to be paired"};
+  Newcomers newcomers(**listener);
+  const auto first = newcomers.wait(deadline);
+  if (!first) return Error{Errc::timeout, "nobody came to be paired" + newcomers.silent_words()};
+  const Deadline soon = std::min(deadline, Deadline::after(kExchange));
+  const auto introduction = introduce_after(first->promised, *first->link, machine_name(), soon);
+  if (!introduction) return introduction.error().with_context(first->address);
+  return settle(*first->link, *introduction, plan, *key, deadline);
 }
 
 Result<Paired> pair_as_client(const PairingPlan& plan, const std::string& host, int port, Deadline deadline) {

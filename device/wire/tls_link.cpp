@@ -21,6 +21,12 @@ namespace {
 constexpr std::size_t kMostSealedBytes = 64U << 10U;  // past one record only where a peer asks for new keys without end
 constexpr std::size_t kRecordBytes = 16U << 10U;
 constexpr Duration kFirstWord = Duration::from_ms(1000);
+// Far more than anybody needs: a sender of ours takes a new key after 128 GiB.
+constexpr Duration kPerNewKey = Duration::from_ms(1000);
+constexpr std::int64_t kNewKeysAtOnce = 64;
+// OpenSSL takes up every new key that it has read, in one call. From a client, which says little, it reads no more at
+// once than some 150 of them.
+constexpr int kMostReadOfAClient = 4 << 10;
 
 int read_bio(BIO* bio, char* into, int size) {
   BIO_clear_retry_flags(bio);
@@ -36,6 +42,13 @@ int write_bio(BIO* bio, const char* from, int size) {
 
 long control_bio(BIO* /*bio*/, int command, long /*number*/, void* /*pointer*/) {
   return command == BIO_CTRL_FLUSH ? 1 : 0;
+}
+
+/// Sees every message of the handshake's kind, before OpenSSL takes it up.
+void see_message(int written, int /*version*/, int content_type, const void* message, std::size_t size, SSL* ssl,
+                 void* /*unused*/) {
+  if (written != 0 || content_type != SSL3_RT_HANDSHAKE || size == 0) return;
+  if (*static_cast<const std::uint8_t*>(message) == SSL3_MT_KEY_UPDATE) TlsLink::of(ssl).note_new_key();
 }
 
 /// Not OpenSSL's own of a socket: that raises SIGPIPE, and one that takes only part of a record wants the same bytes
@@ -64,6 +77,7 @@ Result<std::unique_ptr<TlsLink>> TlsLink::over(UniqueFd connected, std::shared_p
   SSL* const ssl = link->ssl_.get();
   ::SSL_set_bio(ssl, bio, bio);
   SSL_set_app_data(ssl, link.get());
+  ::SSL_set_msg_callback(ssl, see_message);
   if (side == Side::client) {
     ::SSL_set_connect_state(ssl);
   } else {
@@ -71,6 +85,12 @@ Result<std::unique_ptr<TlsLink>> TlsLink::over(UniqueFd connected, std::shared_p
   }
   return link;
 }
+
+TlsLink::TlsLink(UniqueFd fd, std::shared_ptr<const Tls> tls, std::uint64_t bytes_by_one_key)
+    : fd_(std::move(fd)),
+      tls_(std::move(tls)),
+      bytes_by_one_key_(bytes_by_one_key),
+      new_keys_(kPerNewKey, kNewKeysAtOnce) {}
 
 TlsLink::~TlsLink() {
   if (peer_key_ && !broken_) ::SSL_shutdown(ssl_.get());  // says that it ends; nobody waits for the answer
@@ -97,7 +117,15 @@ bool TlsLink::takes_key_of(X509* certificate) {
   return false;
 }
 
+void TlsLink::note_new_key() {
+  const DeviceTime now = device_now();
+  too_many_keys_ = too_many_keys_ || now < new_keys_.free_at();
+  new_keys_.passed(now);
+}
+
 int TlsLink::read_socket(char* into, int size) {
+  if (too_many_keys_) return -2;
+  if (::SSL_is_server(ssl_.get()) != 0) size = std::min(size, kMostReadOfAClient);
   const ssize_t got = ::recv(fd_.get(), into, static_cast<std::size_t>(size), MSG_DONTWAIT);
   if (got < 0) return errno == EAGAIN || errno == EINTR ? -1 : -2;
   return static_cast<int>(got);
@@ -135,6 +163,7 @@ Error TlsLink::failure() {
   broken_ = true;
   read_ahead_ = true;  // so that whoever waits for bytes comes to read, and is told
   if (refused_) return {Errc::bad_value, "its key is not known here"};
+  if (too_many_keys_) return {Errc::bad_format, "the other side asks for new keys without end"};
   const int reason = ERR_GET_REASON(::ERR_peek_last_error());
   if (reason == SSL_R_SSLV3_ALERT_BAD_CERTIFICATE) return {Errc::bad_value, "it does not know this machine's key"};
   return {Errc::disconnected, "the other side has gone"};
@@ -182,11 +211,11 @@ Result<std::size_t> TlsLink::read_some(std::span<std::uint8_t> into) {
   read_ahead_ = true;
   while (count < into.size()) {
     std::size_t got = 0;
-    if (!broken_ && ::SSL_read_ex(ssl_.get(), into.data() + count, into.size() - count, &got) == 1) {
+    if (!broken_ && !too_many_keys_ && ::SSL_read_ex(ssl_.get(), into.data() + count, into.size() - count, &got) == 1) {
       count += got;
       continue;
     }
-    const int why = broken_ ? SSL_ERROR_SSL : ::SSL_get_error(ssl_.get(), 0);
+    const int why = broken_ || too_many_keys_ ? SSL_ERROR_SSL : ::SSL_get_error(ssl_.get(), 0);
     if (why == SSL_ERROR_WANT_READ || why == SSL_ERROR_WANT_WRITE) {
       read_ahead_ = false;
       return count;

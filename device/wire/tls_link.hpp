@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/time/rate_limit.hpp"
 #include "device/wire/socket_link.hpp"
 #include "device/wire/tls.hpp"
 #include "drivers/system/unique_fd.hpp"
@@ -65,10 +66,11 @@ class TlsLink final : public SocketLink {
   /// The socket as OpenSSL reads and writes it; 0: the other side has ended; -1: nothing for now; -2: it is broken.
   int read_socket(char* into, int size);
   int write_socket(const char* from, int size);
+  /// The other side goes on with a new key.
+  void note_new_key();
 
  private:
-  TlsLink(UniqueFd fd, std::shared_ptr<const Tls> tls, std::uint64_t bytes_by_one_key)
-      : fd_(std::move(fd)), tls_(std::move(tls)), bytes_by_one_key_(bytes_by_one_key) {}
+  TlsLink(UniqueFd fd, std::shared_ptr<const Tls> tls, std::uint64_t bytes_by_one_key);
   /// Waits for bytes to come and, as long as some are unsent, for room to send them.
   bool wait_socket(Deadline deadline);
   /// Why the last call of OpenSSL did not do what it should.
@@ -80,6 +82,8 @@ class TlsLink final : public SocketLink {
   std::shared_ptr<SSL> ssl_;
   std::optional<PublicKey> shown_, peer_key_;
   std::string peer_name_;
+  RateLimit new_keys_;  ///< of the other side
+  bool too_many_keys_ = false;
   bool refused_ = false;      ///< the other side's key is not known here
   bool broken_ = false;       ///< OpenSSL can do no more for it
   bool read_ahead_ = true;    ///< the last read did not yet come to the end of what is there

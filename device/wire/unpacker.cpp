@@ -77,7 +77,7 @@ std::optional<Transform<Tracker, Sensor>> pose_of(igtl::TrackingDataElement& ele
                                     Eigen::Vector3d(m.topRightCorner<3, 1>()));
 }
 
-/// Empty where one of them is no pose.
+/// Empty where one of them is no pose, or two have one name: nobody could say which of them is that bird's.
 std::optional<Birds> birds_of(igtl::TrackingDataMessage& message, DeviceTime time) {
   Birds birds;
   birds.acquired = time;
@@ -85,8 +85,9 @@ std::optional<Birds> birds_of(igtl::TrackingDataMessage& message, DeviceTime tim
     igtl::TrackingDataElement::Pointer element;
     message.GetTrackingDataElement(i, element);
     const auto pose = pose_of(*element);
-    if (!pose) return std::nullopt;
-    birds.birds.push_back({element->GetName(), *pose});
+    const std::string name = element->GetName();
+    if (!pose || std::ranges::find(birds.birds, name, &Bird::name) != birds.birds.end()) return std::nullopt;
+    birds.birds.push_back({name, *pose});
   }
   return birds;
 }
@@ -147,7 +148,10 @@ Result<MaybeTold> Unpacker::push(std::span<const std::uint8_t> bytes) {
     return push_string(device, *text);
   }
   if (image) {
-    auto frame = frame_of(*header, body, *std::exchange(info_, std::nullopt));
+    FrameInfo info = *std::exchange(info_, std::nullopt);
+    // Both were written of one time: what is of another is not this picture's.
+    if (header->time.ns != time_from(stamp_from(info.acquired)).ns) return unpack_failed(type);
+    auto frame = frame_of(*header, body, std::move(info));
     if (!frame) return frame.error();
     return MaybeTold(Event(*std::move(frame)));
   }

@@ -4,15 +4,15 @@
 #include <fmt/format.h>
 #include <pthread.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 
 #include "drivers/system/time_keeper.hpp"
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye {
 
@@ -49,8 +49,21 @@ void at_work_on(const char* part) {
 }
 
 Result<void> CrashNote::keep_in(const std::filesystem::path& file) {
-  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-  if (fd < 0) return Error{Errc::io, fmt::format("{}: cannot be written ({})", file.string(), std::strerror(errno))};
+  // Neither a pipe, which nobody may ever read, is waited for, nor what a link leads to emptied.
+  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0600);
+  int failed = fd < 0 ? errno : 0;
+  struct stat status {};
+  if (fd >= 0 && ::fstat(fd, &status) != 0) failed = errno;
+  const bool other =
+      fd >= 0 ? failed == 0 && !S_ISREG(status.st_mode) : failed == ELOOP || failed == ENXIO || failed == EISDIR;
+  if (fd >= 0 && failed == 0 && !other && ::ftruncate(fd, 0) != 0) failed = errno;
+  if (fd >= 0 && (other || failed != 0)) ::close(fd);
+  if (other) {
+    return Error{Errc::bad_value,
+                 fmt::format("{}: is no file but a link, a pipe, a folder or a device; remove it", file.string())};
+  }
+  if (failed != 0)
+    return Error{Errc::io, fmt::format("{}: cannot be written ({})", file.string(), std::strerror(failed))};
   if (const int former = note_fd.exchange(fd); former >= 0) ::close(former);
   struct sigaction action {};
   action.sa_sigaction = note_crash;
@@ -64,10 +77,9 @@ void CrashNote::write(const std::string& part) {
 }
 
 std::string CrashNote::read(const std::filesystem::path& file) {
-  std::array<char, 64> text{};  // longer than any name
-  std::ifstream in(file, std::ios::binary);
-  in.read(text.data(), text.size());
-  return {text.data(), static_cast<std::size_t>(in.gcount())};
+  constexpr std::size_t kMostBytes = 64;  // longer than any name
+  const auto text = read_whole_file(file, kMostBytes);
+  return text ? *text : std::string();
 }
 
 }  // namespace birdseye

@@ -33,7 +33,19 @@ TEST(CalibrationRecord, IsReadBackExactly) {
   EXPECT_EQ(rod.picture_turn, example().hand_eye->rod->picture_turn);
   EXPECT_EQ(read->tip->tip_in_sensor_mm, example().tip->tip_in_sensor_mm);
   EXPECT_EQ(read->latency->ci95_low_ms, 82.6);
+  EXPECT_FALSE(read->latency->camera_delay_ms) << "nobody said it";
   EXPECT_EQ(read->lens->provenance.grade, Grade::marginal);
+}
+
+TEST(CalibrationRecord, KeepsTheDelayThatItsLatencyWasMeasuredWith) {
+  CalibrationRecord record = example();
+  EXPECT_EQ(record_text(record).find("camera_delay_ms"), std::string::npos);
+  const std::string without = signed_sha256(record);
+  record.latency->camera_delay_ms = 12.5;
+  const auto read = parse_record(record_text(record));
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->latency->camera_delay_ms, 12.5);
+  EXPECT_NE(signed_sha256(record), without);
 }
 
 TEST(CalibrationRecord, MayBeLaidOutAnewButNotChanged) {
@@ -133,6 +145,7 @@ TEST(CalibrationRecord, NumbersThatMakeNoSenseAreRefusedWhateverTheirChecksum) {
   refused([](auto& r) { r.lens->rms_px = 1e300; }, "rms_px is 1e+300");
   refused([](auto& r) { std::swap(r.latency->ci95_low_ms, r.latency->ci95_high_ms); }, "offset_ci95_ms");
   refused([](auto& r) { r.latency->offset_ms = -2e4; }, "offset_ms");
+  refused([](auto& r) { r.latency->camera_delay_ms = -1; }, "camera_delay_ms is -1");
   refused([](auto& r) { r.hand_eye->rod->axis_in_sensor *= 2; }, "unit length");
   refused([](auto& r) { r.hand_eye->independent_stations = 0; }, "no stations");
   refused([](auto& r) { r.tip->provenance.grade = Grade::fail; }, "fail");

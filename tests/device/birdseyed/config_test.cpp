@@ -1,9 +1,12 @@
 #include "device/birdseyed/config.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
+#include <optional>
 
 #include "device/birdseyed/wire_admission.hpp"
 #include "drivers/identity/this_machine.hpp"
@@ -92,6 +95,56 @@ TEST(Config, ARecordOfNobodyKnownIsNotUsedUnlessAskedTo) {
             std::string::npos);
 }
 
+/// By another delay the latency would be taken off twice, or not whole.
+TEST(Config, ARecordWhoseLatencyWasMeasuredWithAnotherDelayIsNotUsed) {
+  const testing::Scratch scratch;
+  const auto own = ThisMachine::open();
+  ASSERT_TRUE(own) << own.error().what;
+  const auto refusal = [&](std::optional<double> measured_ms, const std::string& camera, const std::string& more = "") {
+    auto record = testing::example_record(768, 576, {{"model", "a"}}, {{"model", "b"}});
+    record.latency->camera_delay_ms = measured_ms;
+    const std::string path =
+        scratch.file("record.json", record_text(record, own->sign(calibration::kRecordFormat, signed_sha256(record))));
+    const auto config =
+        read(replaced("[wire]", camera + "[wire]") + "[calibration]\nrecord = \"" + path + "\"\n" + more);
+    return config ? config->core.calibration_refused : config.error().what;
+  };
+  const std::string set = "delay_ms = 83.1\n";
+  EXPECT_NE(refusal(0, set).find("was measured with [camera] delay_ms = 0, which is 83.1 now; set it back"),
+            std::string::npos)
+      << refusal(0, set);
+  EXPECT_NE(refusal(0, set, "accept_unsigned = true\n").find("delay_ms"), std::string::npos);
+  EXPECT_NE(refusal(40, "").find("delay_ms = 40, which is not set now"), std::string::npos) << refusal(40, "");
+  EXPECT_EQ(refusal(83.1, set), "");
+  EXPECT_EQ(refusal(0, ""), "");
+  EXPECT_EQ(refusal(std::nullopt, set), "") << "a record of before";
+}
+
+TEST(Config, ARecordThatIsBoundToNothingIsToldWithTheRemedy) {
+  const testing::Scratch scratch;
+  const auto told = [&scratch](const calibration::Identity& tracker, const calibration::Identity& camera) {
+    const std::string path =
+        scratch.file("record.json", record_text(testing::example_record(768, 576, tracker, camera)));
+    const auto config = read(kSound + std::string("[calibration]\nrecord = \"") + path + "\"\n");
+    return config ? config->calibration_unbound : config.error().what;
+  };
+  EXPECT_NE(told({}, {}).find("record.json: the record does not say which tracker"), std::string::npos) << told({}, {});
+  EXPECT_NE(told({}, {}).find("birdseye calibrate record FILE --bind HOST"), std::string::npos);
+  EXPECT_NE(told({{"model", "a"}}, {}).find("does not say which camera"), std::string::npos);
+  EXPECT_EQ(told({{"model", "a"}}, {{"model", "b"}}), "");
+}
+
+TEST(Config, AMissingCameraIsOneFault) {
+  const auto config = read("[tracker]\ndevice = \"/dev/ttyS0\"\n");
+  ASSERT_FALSE(config);
+  EXPECT_NE(config.error().what.find("[camera] source: is missing"), std::string::npos) << config.error().what;
+  EXPECT_EQ(std::count(config.error().what.begin(), config.error().what.end(), '\n'), 0) << config.error().what;
+  const auto empty = read("[tracker]\ndevice = \"/dev/ttyS0\"\n[camera]\nsource = \"\"\n");
+  ASSERT_FALSE(empty);
+  EXPECT_NE(empty.error().what.find("[camera] source: \"\": give v4l2:DEVICE"), std::string::npos)
+      << empty.error().what;
+}
+
 TEST(Config, AFieldMapThatIsNotThereHidesNoMistakeInTheRecord) {
   const auto config =
       read(kSound + std::string("[calibration]\nfield = \"/none/f.json\"\nrecord = \"/none/r.json\"\n"));
@@ -163,6 +216,65 @@ TEST(Config, TwoBirdsMayNotHaveTransformsOfOneName) {
   std::string without = replaced("\"scope\", \"pointer\"", alike);
   without.replace(without.find("[wire]"), 6, "[wire]\ntransforms = false");
   EXPECT_TRUE(read(without));
+}
+
+TEST(Config, BirdsHaveNamesOfTheirOwnThatTdataCarries) {
+  const std::pair<const char*, const char*> cases[] = {
+      {R"("scope", "table-reference-left-hand-pointer")", "has 33 bytes, and TDATA carries 20"},
+      {R"("scope", "scope")", "two birds are called \"scope\""},
+      {R"("scope", "poin\u0000ter")", "bird 2's name has a control character"},
+      {R"("scope", "poin\nter")", "bird 2's name has a control character"}};
+  for (const auto& [names, expected] : cases) {
+    for (const char* transforms : {"true", "false"}) {
+      std::string text = replaced(R"("scope", "pointer")", names);
+      text.replace(text.find("[wire]"), 6, std::string("[wire]\ntransforms = ") + transforms);
+      const auto config = read(text);
+      ASSERT_FALSE(config) << names;
+      EXPECT_NE(config.error().what.find(expected), std::string::npos) << config.error().what;
+      EXPECT_EQ(config.error().what.find('\n'), std::string::npos) << "it is told once: " << config.error().what;
+    }
+  }
+  EXPECT_TRUE(read(replaced("\"pointer\"", "\"table-reference-left\"")));  // of 20
+}
+
+TEST(Config, PlacesThatCannotBeUsedAreRefusedByName) {
+  const std::string long_path = "/tmp/" + std::string(103, 's');  // a socket's address holds 107
+  const std::string shorter = long_path.substr(0, 107);
+  const auto folder = [](const std::string& path) { return kSound + ("[record]\nfolder = \"" + path + "\"\n"); };
+  const std::pair<std::string, std::string> cases[] = {
+      {replaced("v4l2:/dev/video0", "socket:" + long_path), "[camera] source: a socket's path has at most 107 bytes"},
+      {replaced("/dev/ttyUSB0", "unix:" + long_path), "[tracker] device: a socket's path has at most 107 bytes"},
+      {replaced("/dev/ttyUSB0", "/dev/tty\\u0000USB0"), "[tracker] device: has a control character"},
+      {replaced("[wire]", "[wire]\nbind = \"239.1.2.3\""), "[wire] bind: \"239.1.2.3\" is no machine's"},
+      {replaced("[wire]", "[wire]\nbind = \"255.255.255.255\""), "[wire] bind: \"255.255.255.255\" is no machine's"},
+      {folder("/dev/null"), "[record] folder: \"/dev/null\" is no folder"},
+      {folder("/dev/null/in"), "[record] folder: \"/dev/null\" is no folder"}};
+  for (const auto& [text, expected] : cases) {
+    const auto config = read(text);
+    ASSERT_FALSE(config) << expected;
+    EXPECT_NE(config.error().what.find(expected), std::string::npos) << config.error().what;
+  }
+  for (const std::string& sound :
+       {replaced("v4l2:/dev/video0", "socket:" + shorter), replaced("/dev/ttyUSB0", "unix:" + shorter),
+        replaced("[wire]", "[wire]\nbind = \"0.0.0.0\""), folder("/nonexistent/record")}) {
+    const auto config = read(sound);
+    EXPECT_TRUE(config) << config.error().what;
+  }
+}
+
+TEST(Config, OfManyUnknownKeysTheFirstAreNamedAndTheOthersCounted) {
+  std::string text = kSound;
+  for (int i = 0; i < 25; ++i) text += fmt::format("key{} = 1\n", i);
+  for (int i = 0; i < 12; ++i) text += fmt::format("[part{}]\n", i);
+  const auto config = read(text);
+  ASSERT_FALSE(config);
+  const std::string& what = config.error().what;
+  EXPECT_EQ(std::count(what.begin(), what.end(), '\n'), 10 + 10 + 1) << what;
+  for (const char* expected :
+       {"[pose] key0: unknown key", "[pose] key9: unknown key", "[pose] and 15 more unknown keys",
+        "part9: unknown section", "and 2 more unknown sections"})
+    EXPECT_NE(what.find(expected), std::string::npos) << what;
+  EXPECT_EQ(what.find("key10"), std::string::npos);
 }
 
 TEST(Config, AllMistakesAreToldAtOnceWithTheirLines) {

@@ -267,6 +267,21 @@ TEST(Core, StampsAheadOfTheClockAreRefusedAndSaid) {
   EXPECT_TRUE(said.back().ok) << said.back().text;
 }
 
+TEST(Core, StampsAheadThatJitterAreSaidOnce) {
+  Core core({});
+  wire::Unpacker unpacker;
+  core.take(camera_runs(0));
+  std::size_t said = 0;
+  for (std::uint64_t n = 0; n < 100; ++n) {
+    const double arrived_s = static_cast<double>(n) / 25;
+    const double ahead_s = 2 + 0.03 * static_cast<double>(n % 7);
+    const auto events = unpacked(core.take(FrameCame{frame(n, arrived_s + ahead_s, arrived_s)}), unpacker);
+    for (const auto& status : only<wire::Status>(events)) said += status.ok ? 0 : 1;
+  }
+  EXPECT_EQ(said, 1U);
+  EXPECT_EQ(core.board().state(), ApplianceState::degraded);
+}
+
 TEST(Core, AnInstrumentThatGoesIsSaidOnceAndItsFramesHaveNoPose) {
   auto events = session(4, 3);
   const auto gone = [](const RawEvent& e) { return std::holds_alternative<TrackerBytes>(e) && time_of(e) > at(2); };
@@ -389,6 +404,11 @@ TEST(Recording, OfSettingsThatMakeNoSenseIsRefused) {
   EXPECT_NE(with([](auto& s) { s.bird_names.clear(); }).find("0 names of birds"), std::string::npos);
   EXPECT_NE(with([](auto& s) { s.bird_names.assign(15, "b"); }).find("15 names"), std::string::npos);
   EXPECT_NE(with([](auto& s) { s.bird_names = {""}; }).find("without a name"), std::string::npos);
+  // As TDATA carries them.
+  EXPECT_NE(with([](auto& s) {
+              s.bird_names = {"scope", "table-reference-left-hand-pointer", "table-reference-left"};
+            }).find("two birds of one name"),
+            std::string::npos);
   EXPECT_NE(with([](auto& s) { s.pose.capacity = 0; }).find("limits of poses"), std::string::npos);
   EXPECT_NE(with([](auto& s) { s.frame_clock.rate_hz = 0; }).find("rate of 0 Hz"), std::string::npos);
   EXPECT_NE(with([](auto& s) { s.pose_wait = {-1}; }).find("a time of"), std::string::npos);

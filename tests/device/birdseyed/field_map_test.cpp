@@ -103,6 +103,21 @@ TEST(CoreWithAFieldMap, FramesHaveTheCorrectedPose) {
   EXPECT_GT(judged, 50);
 }
 
+/// A map of before such places were left out of it: made from two levels, it is sure at these and not between them.
+TEST(CoreWithAFieldMap, WhereTheMapIsNotSurePosesAreDoubtedInWords) {
+  const auto events = session(6, 4);
+  calibration::FieldMapData data = map().data();
+  data.sigma_mm.assign(9 * 9 * 9, 5.8);
+  Core core(with(*calibration::FieldMap::from(std::move(data))));
+  const auto said = told(core, events);
+  EXPECT_TRUE(only<wire::Birds>(said).empty());
+  EXPECT_GT(core.counters().tracker.of(drivers::minibird::DoubtKind::unmapped), 500U);
+  bool doubted = false;
+  for (const auto& doubt : only<wire::Doubt>(said))
+    doubted = doubted || doubt.why.find("the map of the field is sure to 5.8 mm, of at most 2.5") != std::string::npos;
+  EXPECT_TRUE(doubted);
+}
+
 TEST(CoreWithAFieldMap, OutsideTheMapPosesAreDoubtedInWords) {
   const auto events = session(8, 3);
   Core core(with(map(450)));  // the circle goes to x = 600

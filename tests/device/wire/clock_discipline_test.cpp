@@ -27,6 +27,9 @@ TEST(ClockDiscipline, IsDecodedFromTheKernelsWords) {
   reading.status = STA_PLL;
   EXPECT_FALSE(decode_discipline(reading, TIME_ERROR).synchronised);
   EXPECT_TRUE(decode_discipline(reading, TIME_INS).synchronised);
+  reading.maxerror = reading.esterror = -5;  // as a daemon may have told the kernel
+  EXPECT_EQ(decode_discipline(reading, TIME_OK).max_error.ns, 0);
+  EXPECT_EQ(decode_discipline(reading, TIME_OK).est_error.ns, 0);
 }
 
 /// An appliance whose wall clock was set to the year 2099 goes on serving.

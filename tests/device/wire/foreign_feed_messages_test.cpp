@@ -122,6 +122,21 @@ TEST(ForeignFeed, DamagedMessagesArePassedOverAndCounted) {
   EXPECT_EQ(frames[0].info.pose.kind, PoseKind::exact);
 }
 
+/// Nobody could say which of the two is that tool's. Of the others' poses there is no doubt.
+TEST(ForeignFeed, OfAListThatHasANameTwiceTheOthersPosesAreTaken) {
+  FeedLink link;
+  const auto bird = [](const char* name, double x_mm) {
+    const Eigen::Isometry3d pose = pose_at(x_mm);
+    return Bird{name, Transform<Tracker, Sensor>(pose.linear(), pose.translation())};
+  };
+  link.push(pack(Birds{{1}, {bird("Probe", 1), bird("Stylus", 2), bird("Probe", 3)}}).bytes(), 0);
+  EXPECT_THAT(link.feed.words(), HasSubstr("\"Probe\", which stands twice in one list"));
+  const auto told = link.of<Birds>(10);
+  ASSERT_EQ(told.size(), 1U);
+  ASSERT_EQ(told[0].birds.size(), 1U);
+  EXPECT_EQ(told[0].birds[0].name, "Stylus");
+}
+
 TEST(ForeignFeed, WhatTheMetaDataCallInvalidIsNoPose) {
   using MetaData = std::vector<std::pair<std::string, std::string>>;
   // As PLUS sends them (TransformValid, TransformStatus), and Slicer (Status).

@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 
 #include <array>
+#include <fstream>
 #include <future>
 #include <string>
 #include <thread>
@@ -133,6 +134,18 @@ TEST(Pairing, AKeyIsKnownOnlyOnceAllElseIsOnTheDisk) {
   EXPECT_TRUE(testing::is_synced(cart.folder / "host.crt"));
 }
 
+TEST(Pairing, AFileBesideACertificateIsLeftAlone) {
+  Machine cart, host;
+  std::filesystem::create_directories(cart.folder);
+  std::filesystem::permissions(cart.folder, std::filesystem::perms::owner_all);
+  const std::filesystem::path beside = cart.folder / "host.crt.part";
+  std::ofstream(beside) << "another's";
+  const Meeting meeting = meet(cart, host);
+  ASSERT_TRUE(meeting.cart) << meeting.cart.error().what;
+  EXPECT_EQ(testing::contents_of(beside), "another's");
+  EXPECT_NE(testing::contents_of(cart.folder / "host.crt").find("BEGIN CERTIFICATE"), std::string::npos);
+}
+
 TEST(Pairing, EachPairingHasACodeOfItsOwn) {
   Machine cart, host;
   (void)meet(cart, host);
@@ -246,6 +259,42 @@ TEST(Pairing, WhoConnectsAndGoesIsNotTheOneTry) {
   }
   EXPECT_TRUE(pair_as_client(host.plan("cart"), "127.0.0.1", port, soon()));
   EXPECT_TRUE(cart_paired.get());
+}
+
+TEST(Pairing, ThoseWhoComeAndSayNothingKeepNobodyWaiting) {
+  Machine cart, host;
+  const testing::TlsMachine silent;
+  std::promise<int> listening;
+  auto cart_paired = std::async(std::launch::async, [&] {
+    return pair_as_server(cart.plan("host"), "127.0.0.1", 0, soon(), [&](int port) { listening.set_value(port); });
+  });
+  const int port = listening.get_future().get();
+  std::vector<std::unique_ptr<TlsLink>> links;
+  // Were each waited for by itself, a client would have given up before its turn comes.
+  for (int i = 0; i < 4; ++i) {
+    links.push_back(
+        *TlsLink::over(*connect_socket("127.0.0.1", port, soon()), *pairing_tls(silent.key()), Side::client));
+    TlsLink& link = *links.back();
+    for (auto shaken = link.shake(); shaken && !*shaken; shaken = link.shake()) link.wait_shaken(soon());
+  }
+  EXPECT_TRUE(pair_as_client(host.plan("cart"), "127.0.0.1", port, soon()));
+  EXPECT_TRUE(cart_paired.get());
+}
+
+TEST(Pairing, WhoCameAndDidNotBeginIsNamedByItsAddress) {
+  Machine cart;
+  const testing::TlsMachine silent;
+  std::promise<int> listening;
+  auto cart_paired = std::async(std::launch::async, [&] {
+    return pair_as_server(cart.plan("host"), "127.0.0.1", 0, Deadline::after(Duration::from_ms(3000)),
+                          [&](int port) { listening.set_value(port); });
+  });
+  const auto link = *TlsLink::over(*connect_socket("127.0.0.1", listening.get_future().get(), soon()),
+                                   *pairing_tls(silent.key()), Side::client);
+  for (auto shaken = link->shake(); shaken && !*shaken; shaken = link->shake()) link->wait_shaken(soon());
+  const auto paired = cart_paired.get();
+  ASSERT_FALSE(paired);
+  EXPECT_EQ(paired.error().what, "nobody came to be paired; 127.0.0.1 came and did not begin");
 }
 
 TEST(Pairing, ATryThatFailedEndsTheWindow) {

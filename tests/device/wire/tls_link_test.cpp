@@ -313,6 +313,30 @@ TEST_F(Tls13, NewKeysWithoutEndAreNotReadOnAndOnInOneGo) {
   EXPECT_EQ(*read(*server_), (Bytes{'s', 'a', 'i', 'd'}));
 }
 
+TEST_F(Tls13, NewKeysWithoutEndEndIt) {
+  connect();
+  const std::shared_ptr<SSL_CTX> context(::SSL_CTX_new(::TLS_client_method()), ::SSL_CTX_free);
+  const Scratch scratch;
+  const std::string certificate = scratch.file("host.crt", host_.tls()->certificate());
+  ASSERT_EQ(::SSL_CTX_use_certificate_file(context.get(), certificate.c_str(), SSL_FILETYPE_PEM), 1);
+  ASSERT_EQ(::SSL_CTX_use_PrivateKey(context.get(), host_.key().evp_pkey()), 1);
+  const Stranger stranger = shake_with(*context);
+  ASSERT_TRUE(server_shook_ && *server_shook_);
+  // More than OpenSSL takes up at once, so that there is a second portion to be refused.
+  for (int i = 0; i < 200; ++i) {
+    ASSERT_EQ(::SSL_key_update(stranger.ssl.get(), SSL_KEY_UPDATE_NOT_REQUESTED), 1);
+    ASSERT_EQ(::SSL_do_handshake(stranger.ssl.get()), 1);
+    ASSERT_GT(carry(near_, far_), 0U);
+  }
+  Result<Bytes> got = Bytes();
+  for (int i = 0; i < 200 && got && got->empty(); ++i) got = read(*server_);
+  ASSERT_FALSE(got);
+  EXPECT_EQ(got.error().code, Errc::bad_format);
+  EXPECT_NE(got.error().what.find("new keys without end"), std::string::npos) << got.error().what;
+  std::array<std::uint8_t, 1> rest{};
+  EXPECT_EQ(::recv(server_->fd(), rest.data(), rest.size(), MSG_PEEK), 1) << "it was not read to its end";
+}
+
 TEST_F(Tls13, ACertificateIsTheSameEachTime) {
   const auto again = Tls::make(cart_.key(), [](const PublicKey&) { return std::nullopt; });
   EXPECT_EQ((*again)->certificate(), cart_.tls()->certificate());

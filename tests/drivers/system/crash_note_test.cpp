@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
+#include <string>
 #include <thread>
 
 #include "tests/support/scratch.hpp"
@@ -108,6 +111,20 @@ TEST(CrashNote, BeginsEmpty) {
   EXPECT_EQ(CrashNote::read(path), "");
   EXPECT_EQ(CrashNote::read(scratch / "none"), "");
   EXPECT_FALSE(CrashNote::keep_in(scratch / "none" / "note"));
+}
+
+TEST(CrashNote, APipeIsRefusedAndNotWaitedForAndALinkIsNotFollowed) {
+  const testing::Scratch scratch;
+  const std::string pipe = scratch / "pipe", link = scratch / "link", other = scratch.file("other", "kept");
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  std::filesystem::create_symlink(other, link);
+  EXPECT_EQ(CrashNote::read(pipe), "");
+  for (const std::string& path : {pipe, link, std::string(scratch / ".")}) {
+    const auto kept = CrashNote::keep_in(path);
+    ASSERT_FALSE(kept) << path;
+    EXPECT_NE(kept.error().what.find("is no file"), std::string::npos) << kept.error().what;
+  }
+  EXPECT_EQ(std::filesystem::file_size(other), 4U);
 }
 
 }  // namespace
