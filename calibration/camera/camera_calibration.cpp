@@ -12,6 +12,7 @@
 #include "calibration/camera/board_flatness.hpp"
 #include "calibration/camera/camera_bundle.hpp"
 #include "calibration/camera/camera_figures.hpp"
+#include "calibration/camera/camera_focus.hpp"
 #include "calibration/camera/camera_outliers.hpp"
 #include "calibration/camera/camera_views.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
@@ -252,8 +253,12 @@ CameraCalibration put_together(const ModelFit& fit, const SoundViews& sound,
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(),
             [&](std::size_t a, std::size_t b) { return sound.views[a].index < sound.views[b].index; });
-  for (const std::size_t v : order)
+  std::vector<BundleView> in_order;
+  for (const std::size_t v : order) {
     add_view(sound.views[v], fit.camera, fit.views[v], fit.held_out_squares_px2[v], out);
+    in_order.push_back(fit.views[v]);
+  }
+  out.focal_halves = compare_halves(fit.camera, fit.model, in_order);
   add_covariance(fit, out);
   add_geometry(out);
   add_regions(settings.columns, settings.rows, out);

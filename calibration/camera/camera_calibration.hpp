@@ -79,6 +79,12 @@ struct RegionResidual {
   Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();  ///< what is left of a lens model that does not fit there
 };
 
+/// Of the first half of the views, in the order given, and of the second: fx and fy's mean, found from each alone.
+struct FocalHalves {
+  double first_px = 0, second_px = 0;
+  double sigma_px = 0;  ///< one standard deviation of their difference
+};
+
 struct CameraCalibration {
   CameraModel camera;
   LensModel model = LensModel::pinhole;
@@ -101,8 +107,9 @@ struct CameraCalibration {
   double board_sag_mm = 0;
   /// The model with the least held-out error, where the views held out refute the one that was asked for.
   std::optional<LensModel> refuted_by;
-  double pixel_aspect = 1;   ///< as it was given
-  std::string undetermined;  ///< what the views leave open, in words; empty where they determine all
+  std::optional<FocalHalves> focal_halves;  ///< where there are views enough
+  double pixel_aspect = 1;                  ///< as it was given
+  std::string undetermined;                 ///< what the views leave open, in words; empty where they determine all
   std::vector<Transform<Camera, Marker>> camera_from_marker;  ///< one per used view
   std::vector<FittedView> views;                              ///< used, in the order given
   std::vector<RejectedView> rejected;
@@ -153,6 +160,8 @@ inline constexpr double kCoveragePass = 0.5, kCoverageMarginal = 0.25;
 // A focal length that is off by 0.5 % moves the far end of a scene from 100 to 150 mm by 0.25 mm in depth; one that is
 // off by 3 %, by 1.5 mm.
 inline constexpr double kFocalSigmaPass = 0.005, kFocalSigmaMarginal = 0.03;
+// Halves of sound views differ by so many sigmas less often than once in a thousand calibrations.
+inline constexpr double kFocusSigmas = 4;
 inline constexpr double kCentreSigmaPass = 0.005, kCentreSigmaMarginal = 0.02;  ///< of the width
 // Focal length and distance are told apart by foreshortening alone, which goes with the sine of the tilt.
 inline constexpr double kTiltSpreadPass_deg = 25, kTiltSpreadMarginal_deg = 10;

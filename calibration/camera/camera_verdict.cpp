@@ -56,6 +56,21 @@ void judge_fit(const CameraCalibration& c, Verdict& verdict) {
   }
 }
 
+void judge_focus(const FocalHalves& halves, Verdict& verdict) {
+  const double apart_px = std::abs(halves.second_px - halves.first_px);
+  const double apart = 2 * apart_px / (halves.first_px + halves.second_px);
+  // Written so that figures that are no numbers pass: the focal length itself is judged elsewhere.
+  if (!(apart_px > limits::kFocusSigmas * halves.sigma_px && apart > limits::kFocalSigmaPass)) return;
+  // The lens found lies between the two, off by half of that from either.
+  verdict.add(apart / 2 > limits::kFocalSigmaMarginal ? Grade::fail : Grade::marginal,
+              fmt::format("the lens was refocused or zoomed between views, or the lens model or a board that sags does "
+                          "not hold for both halves: the focal length is {:.1f} px by the first half of the views and "
+                          "{:.1f} px by the second, {:.1f} sigmas apart, of at most {:g}",
+                          halves.first_px, halves.second_px, apart_px / halves.sigma_px, limits::kFocusSigmas),
+              "take all views again, do not touch focus and zoom from the first view to the last, fix the board on "
+              "something stiff, and mix tilts and places in the picture all along");
+}
+
 void judge_lens(const CameraCalibration& c, Verdict& verdict) {
   const CameraVector sigma = c.sigma();
   if (c.board_sag_mm > 0) {
@@ -71,6 +86,7 @@ void judge_lens(const CameraCalibration& c, Verdict& verdict) {
   verdict.judge("focal length known to", focal, "%", 100 * limits::kFocalSigmaPass, 100 * limits::kFocalSigmaMarginal,
                 "take more views with the board tilted by 20 to 45 degrees: facing it, focal length and distance "
                 "look alike");
+  if (c.focal_halves) judge_focus(*c.focal_halves, verdict);
   const double centre = 100 * std::max(sigma[2], sigma[3]) / c.camera.width_px;
   verdict.judge("picture centre known to", centre, "% of the width", 100 * limits::kCentreSigmaPass,
                 100 * limits::kCentreSigmaMarginal,

@@ -8,6 +8,7 @@
 #include "calibration/base/units.hpp"
 #include "calibration/field/board_shape.hpp"
 #include "calibration/field/field_fit_parts.hpp"
+#include "calibration/field/field_levels.hpp"
 #include "calibration/geometry/rotations.hpp"
 #include "calibration/points/point_fit.hpp"
 #include "calibration/points/point_shape.hpp"
@@ -248,10 +249,14 @@ Result<void> finish(std::span<const FieldSample> samples, const SmoothedBasis& b
     fit.before_deg = kDegPerRad * detail::rms(rotations, grid.used);
     fit.held_out_deg = kDegPerRad * detail::rms(held_out(basis, turning, grid, rotations, smoothing).errors, grid.used);
   }
-  fit.mapped_part = detail::mapped_part(data.sigma_mm);
   auto map = FieldMap::from(std::move(data));
   if (!map) return map.error();
   fit.map = *std::move(map);
+  Vectors used_mm;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (grid.used[i]) used_mm.push_back(grid.measured_mm[i]);
+  }
+  detail::take_mapped(used_mm, fit);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     fit.residuals.push_back(
         {samples[i].name, grid.measured_mm[i], -grid.wanted_mm[i], held.errors[i], !grid.used[i], bent[i], beyond[i]});
@@ -339,12 +344,16 @@ Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitS
     return screened.error();
 
   // An outlier may lie far outside: the box is that of what is used.
-  Vectors used_mm;
+  Vectors used_mm, true_mm;
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (grid.used[i]) used_mm.push_back(grid.measured_mm[i]);
+    if (!grid.used[i]) continue;
+    used_mm.push_back(grid.measured_mm[i]);
+    true_mm.push_back(*fit.tracker_from_board * samples[i].true_mm);
   }
   box = detail::box_of(used_mm);
   if (!box) return box.error();
+  // Of the true places: as measured, the field blurs the levels.
+  if (const auto levels = detail::check_levels(true_mm, *box); !levels) return levels.error();
   for (std::size_t i = 0; i < samples.size(); ++i) grid.fold[i] = detail::fold_of(*box, grid.measured_mm[i]);
   const auto functions = detail::families(*box, used_mm, settings.basis, used_mm.size() * 9 / 10);
   std::vector<SmoothedBasis> bases;

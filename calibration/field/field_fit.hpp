@@ -73,7 +73,8 @@ struct FieldFit {
   double held_out_mm = 0, held_out_worst_mm = 0;
   std::string worst;                               ///< its name
   std::optional<double> before_deg, held_out_deg;  ///< RMS, where orientation was mapped
-  double mapped_part = 0;                          ///< of the box, 0..1
+  double mapped_part = 0;                          ///< of the box about the places, 0..1
+  double sigma95_mm = 0;                           ///< the map's own sigma: 95 % of what is mapped has less
   std::optional<Transform<Tracker, Marker>> tracker_from_board;
   /// Grid: how much longer the tracker has distances than the board, as a factor, and along each of the board's axes.
   /// Pairs: 1.
@@ -99,8 +100,8 @@ struct FieldFit {
 /// samples follows it, and the map leaves the places about them out. Orientations, where known, get a map of the same
 /// family from w = log(R_board turned_i sensor R_i^T). Where all samples are turned alike, the mean of w cannot be told
 /// from how the sensor sits in its holder, and is taken for that. Refuses fewer than 30 samples, samples in a plane or
-/// thinner than 100 mm, places that are not finite, a grid of which the measured places are the mirror image, and units
-/// that differ (a factor beyond 0.8..1.25).
+/// thinner than 100 mm along their own axes, places at two levels, places that are not finite, a grid of which the
+/// measured places are the mirror image, and units that differ (a factor beyond 0.8..1.25).
 Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitSettings& settings = {});
 
 /// What a map is good for, from its own figures.

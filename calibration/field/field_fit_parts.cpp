@@ -9,6 +9,8 @@
 
 #include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
+#include "calibration/field/field_levels.hpp"
+#include "calibration/field/field_regression.hpp"
 
 namespace birdseye::calibration {
 
@@ -23,13 +25,19 @@ Result<FieldFunctions> box_of(std::span<const Eigen::Vector3d> places_mm) {
     box.low_mm = box.low_mm.cwiseMin(p);
     box.high_mm = box.high_mm.cwiseMax(p);
   }
+  const auto too_thin = [](const Eigen::Vector3d& size_mm, const char* along) {
+    return Error{
+        Errc::degenerate,
+        fmt::format("the samples fill {:.0f} x {:.0f} x {:.0f} mm{}; a map needs {:.0f} mm along each axis, so "
+                    "lift the board, or put it at more heights",
+                    size_mm.x(), size_mm.y(), size_mm.z(), along, kThinnestBoxMm)};
+  };
   const Eigen::Vector3d size_mm = box.high_mm - box.low_mm;
-  if (!(size_mm.minCoeff() >= kThinnestBoxMm)) {
-    return Error{Errc::degenerate,
-                 fmt::format("the samples fill {:.0f} x {:.0f} x {:.0f} mm; a map needs {:.0f} mm along each axis, so "
-                             "lift the board, or put it at more heights",
-                             size_mm.x(), size_mm.y(), size_mm.z(), kThinnestBoxMm)};
-  }
+  if (!(size_mm.minCoeff() >= kThinnestBoxMm)) return too_thin(size_mm, "");
+  // A board that is tilted fills a box and is thin all the same.
+  const OwnBox own = own_box(places_mm);
+  const Eigen::Vector3d own_mm = own.high_mm - own.low_mm;
+  if (!(own_mm.minCoeff() >= kThinnestBoxMm)) return too_thin(own_mm, " along their own axes");
   return box;
 }
 
@@ -104,9 +112,22 @@ void sum_up(FieldFit& fit) {
   fit.held_out_mm = std::sqrt(after / std::max(1.0, within));
 }
 
-double mapped_part(const std::vector<double>& sigmas_mm) {
-  const auto mapped = std::count_if(sigmas_mm.begin(), sigmas_mm.end(), [](double s) { return s >= 0; });
-  return static_cast<double>(mapped) / static_cast<double>(sigmas_mm.size());
+void take_mapped(std::span<const Eigen::Vector3d> places_mm, FieldFit& fit) {
+  constexpr double kMost = 0.95;
+  const FieldMapData& data = fit.map.data();
+  const OwnBox around = own_box(places_mm);
+  std::vector<double> mapped;
+  double nodes = 0;
+  for (std::size_t node = 0; node < data.sigma_mm.size(); ++node) {
+    if (!around.holds(place_of_node(data.functions, node))) continue;
+    ++nodes;
+    if (data.sigma_mm[node] >= 0) mapped.push_back(data.sigma_mm[node]);
+  }
+  fit.mapped_part = static_cast<double>(mapped.size()) / std::max(1.0, nodes);
+  if (mapped.empty()) return;
+  const auto at = mapped.begin() + static_cast<std::ptrdiff_t>(kMost * static_cast<double>(mapped.size() - 1));
+  std::ranges::nth_element(mapped, at);
+  fit.sigma95_mm = *at;
 }
 
 std::string unit_of(double mm_per_unit) {
@@ -130,7 +151,9 @@ constexpr double kSoundScale = 0.02, kWorstScale = 0.05;
 constexpr double kWorstFactor = 5;   // of the RMS; beyond it one region is not described by the map
 constexpr double kLittleGain = 0.9;  // of the error before: the map takes away next to nothing
 constexpr double kFewOutliers = 0.1, kManyOutliers = 0.25;
-constexpr double kMostlyMapped = 0.6;           // of the box
+constexpr double kMostlyMapped = 0.6, kHardlyMapped = 0.1;  // of the box
+// A place at the rim is known less well than those that were held out. Beyond detail::kMostSigmaMm it is not mapped.
+constexpr double kSigmaPassMm = 1.5;
 constexpr double kLeastDirectionSpread = 0.02;  // a body that is turned by 30 deg about two axes has 0.06
 
 /// Metal moves no level of a grid as a whole, and stretches hardly anything evenly: such is the board, or its table.
@@ -266,9 +289,13 @@ Verdict verdict_of(const FieldFit& fit) {
                 "if the error before is small enough, work without a map");
   }
   judge_outliers(fit, verdict);
+  verdict.judge("the map's own sigma, in 95 % of what is mapped,", fit.sigma95_mm, "mm", kSigmaPassMm,
+                detail::kMostSigmaMm, "measure more places, and at more levels, where poses will be");
   if (fit.mapped_part < kMostlyMapped) {
-    verdict.add(Grade::marginal,
-                fmt::format("only {:.0f} % of the box around the samples is mapped", 100 * fit.mapped_part),
+    verdict.add(fit.mapped_part < kHardlyMapped ? Grade::fail : Grade::marginal,
+                fmt::format("only {:.0f} % of the box around the samples is mapped: elsewhere nothing was measured "
+                            "nearby, or the map is not sure to {:.1f} mm",
+                            100 * fit.mapped_part, detail::kMostSigmaMm),
                 "measure where the report shows gaps: poses there will be doubted");
   }
   if (fit.from_pairs) {

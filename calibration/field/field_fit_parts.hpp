@@ -17,7 +17,7 @@ inline constexpr double kOutlierSigmas = 4.5;
 inline constexpr double kLeastOutlierMm = 2, kLeastOutlierAtFirstMm = 5;
 inline constexpr double kThinnestBoxMm = 100;  // a thinner one says nothing about the third direction
 
-/// The box around places; an error where it is too thin to map.
+/// The box around places; an error where they are too thin to map, along the tracker's axes or their own.
 Result<FieldFunctions> box_of(std::span<const Eigen::Vector3d> places_mm);
 
 /// The families and orders to try, given how many measurements there are and how many parameters are allowed.
@@ -37,6 +37,7 @@ double rms(std::span<const Eigen::Vector3d> errors, const std::vector<bool>& use
 void sum_up(FieldFit& fit);
 /// "cm" for 10 of them in one, where mm were taken for granted; nothing where the factor is no unit's.
 std::string unit_of(double mm_per_unit);
-double mapped_part(const std::vector<double>& sigmas_mm);
+/// How much of the box around the places, along their own axes, the map has, and how sure it is there.
+void take_mapped(std::span<const Eigen::Vector3d> places_mm, FieldFit& fit);
 
 }  // namespace birdseye::calibration::detail

@@ -376,7 +376,6 @@ Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const Fi
   const Vectors after = held_out(model, linear, data, smoothing);
   const auto solution = linear.normals.solve(smoothing, -1);
   FieldMapData map_data = map_of(model, data, solution, detail::rms(after, data.used));
-  const double part = detail::mapped_part(map_data.sigma_mm);
   auto map = FieldMap::from(std::move(map_data));
   if (!map) return map.error();
 
@@ -384,7 +383,11 @@ Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const Fi
   fit.from_pairs = true;
   fit.candidates = std::move(candidates);
   fit.chosen = fit.candidates[best];
-  fit.mapped_part = part;
+  Vectors used_mm;
+  for (std::size_t i = 0; i < data.places_mm.size(); ++i) {
+    if (data.used[i / 2]) used_mm.push_back(data.places_mm[i]);  // two places a pair
+  }
+  detail::take_mapped(used_mm, fit);
   fit.a_from_b_mm = solution.parameters.bottomRows<3>();
   fit.direction_spread = direction_spread(data);
   fit.stated_distance_mm = settings.distance_mm;

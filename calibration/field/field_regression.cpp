@@ -140,6 +140,14 @@ FoldedNormals::Solution FoldedNormals::solve(double smoothing, int left_out) con
   return {factors.solve(right), factors.solve(MatrixXd::Identity(normal.rows(), normal.cols()))};
 }
 
+Eigen::Vector3d place_of_node(const FieldFunctions& box, std::size_t node) {
+  constexpr std::size_t kNodes = FieldMapData::kNodes;
+  const std::size_t x = node % kNodes, y = node / kNodes % kNodes, z = node / (kNodes * kNodes);
+  const Eigen::Vector3d part = Eigen::Vector3d(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)) /
+                               static_cast<double>(kNodes - 1);
+  return box.low_mm + part.cwiseProduct(box.high_mm - box.low_mm);
+}
+
 double reach_mm(const FieldFunctions& box, std::span<const Eigen::Vector3d> places_mm) {
   constexpr double kPartOfDiagonal = 0.125;
   constexpr double kSpare = 1.3;  // a cell's middle is 0.87 of its side from its corners

@@ -54,21 +54,26 @@ struct FoldedNormals {
 
 inline constexpr double kSmoothings[] = {1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1};
 
-/// The lattice of sigmas: at each node, `at(place)`, or -1 where no place is within reach.
+// What an overlay may be off by at all (the limit of a map that is marginal): a pose that the map may move by a larger
+// error is no better than one without a map, and is not published.
+inline constexpr double kMostSigmaMm = 2.5;
+
+/// Where a node of the lattice of sigmas lies.
+Eigen::Vector3d place_of_node(const FieldFunctions& box, std::size_t node);
+
+/// The lattice of sigmas: at each node, `at(place)`, or -1 where no place is within reach, and where the map itself is
+/// not sure to kMostSigmaMm: at places that lie side by side and yet do not tell how the field bends between them.
 template <typename At>
 std::vector<double> sigma_lattice(const FieldFunctions& box, std::span<const Eigen::Vector3d> places_mm,
                                   double reach_mm, const At& at) {
   constexpr std::size_t kNodes = FieldMapData::kNodes;
   std::vector<double> out;
   for (std::size_t node = 0; node < kNodes * kNodes * kNodes; ++node) {
-    const std::size_t x = node % kNodes, y = node / kNodes % kNodes, z = node / (kNodes * kNodes);
-    const Eigen::Vector3d part =
-        Eigen::Vector3d(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)) /
-        static_cast<double>(kNodes - 1);
-    const Eigen::Vector3d place = box.low_mm + part.cwiseProduct(box.high_mm - box.low_mm);
+    const Eigen::Vector3d place = place_of_node(box, node);
     double nearest = 1e300;
     for (const Eigen::Vector3d& p : places_mm) nearest = std::min(nearest, (p - place).squaredNorm());
-    out.push_back(nearest <= reach_mm * reach_mm ? at(place) : -1);
+    const double sigma_mm = nearest <= reach_mm * reach_mm ? at(place) : -1;
+    out.push_back(sigma_mm <= kMostSigmaMm ? sigma_mm : -1);
   }
   return out;
 }

@@ -14,6 +14,7 @@
 #include "calibration/hand_eye/hand_eye_refinement.hpp"
 #include "calibration/hand_eye/hand_eye_robust_fit.hpp"
 #include "calibration/hand_eye/hand_eye_stations.hpp"
+#include "calibration/hand_eye/hand_eye_step.hpp"
 #include "calibration/hand_eye/hand_eye_table.hpp"
 
 namespace birdseye::calibration {
@@ -80,8 +81,13 @@ HandEyeResult calibrate(const HandEyeInput& in) {
   out.corner_sigma_px = stations.corner_sigma_px;
   for (const auto& r : stations.rejected) out.stations[r.index].why_not = "rejected: " + r.why;
   const std::vector<SummedStation> summed = summed_of(stations.used);
-  StationsInOrder order{
-      summed, {}, stations.square_mm, in.stations.front().camera_from_marker.has_value(), freedom.time_offset};
+  StationsInOrder order{summed,
+                        {},
+                        stations.square_mm,
+                        in.stations.front().camera_from_marker.has_value(),
+                        freedom.time_offset,
+                        in.sensor_inverted,
+                        in.eye_inverted};
   for (const PreparedStation& s : stations.used) {
     HandEyeStationFit& row = out.stations[s.index];
     row.view_rms_px = s.view_rms_px;
@@ -98,6 +104,7 @@ HandEyeResult calibrate(const HandEyeInput& in) {
     widen_by_blocks(blocks, *refined, out);
     out.independent_stations = static_cast<int>(blocks.in_time.without.size());
     fill_station_table(stations, freedom, *refined, *robust, blocks.in_time, out);
+    out.step = find_step(in, stations, freedom, robust->fit.state, *robust, out.working_distance_mm);
     add_lens_error(in, stations, freedom, *refined, *robust, out);
   } else {
     out.observability.solvable = false;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <optional>
 #include <string>
@@ -41,6 +42,8 @@ struct HandEyeInput {
   std::optional<double> corner_sigma_px;      ///< per axis; none: estimated from the residuals
   std::optional<BoardSymmetry> symmetry;      ///< of a board whose pictures do not tell which way round it lies
   bool estimate_time_offset = false;          ///< the stations then hold their motions
+  /// Poses were turned round as they were read, for somebody said that they are the inverse: for advice on them.
+  bool sensor_inverted = false, eye_inverted = false;
 };
 
 /// Something that the person who holds the scope should know.
@@ -89,6 +92,19 @@ struct HandEyeStationFit {
   std::vector<Eigen::Vector2d> seen_px, tracked_corner_px;  ///< held out
 };
 
+/// Between two stations something moved that calibration takes for fixed, or the tracker's field differs.
+struct HandEyeStep {
+  std::string before, after;  ///< the stations' names
+  /// By how much what is drawn at the board is off then, with one standard deviation.
+  double shift_mm = 0, shift_sigma_mm = 0;
+  double turn_deg = 0, turn_sigma_deg = 0;
+  double sigmas = 0, limit_sigmas = 0;  ///< how far from chance, and how far chance goes
+
+  /// What 97.5 % of such estimates bear out: where the stations tell a direction badly, the estimate alone is large.
+  [[nodiscard]] double least_shift_mm() const { return std::max(0.0, shift_mm - 2 * shift_sigma_mm); }
+  [[nodiscard]] double least_turn_deg() const { return std::max(0.0, turn_deg - 2 * turn_sigma_deg); }
+};
+
 struct HandEyeResult {
   bool solved = false;  ///< otherwise only observability, and of the stations what was rejected, are filled
   Transform<Camera, Sensor> camera_from_sensor;
@@ -119,7 +135,8 @@ struct HandEyeResult {
   std::string start;                        ///< the one that was refined
   std::vector<HandEyeStationFit> stations;  ///< in the order of the input
   std::vector<std::string> outliers;
-  std::vector<double> cost_trace;  ///< of the last refinement, per iteration
+  std::optional<HandEyeStep> step;  ///< the most likely, where chance is no excuse
+  std::vector<double> cost_trace;   ///< of the last refinement, per iteration
 
   [[nodiscard]] Eigen::Vector3d rotation_sigma_deg() const;
   [[nodiscard]] Eigen::Vector3d translation_sigma_mm() const;

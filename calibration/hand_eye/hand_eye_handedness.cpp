@@ -132,18 +132,30 @@ std::optional<Finding> find_disorder(const StationsInOrder& in, double least_mm)
   return seem_disordered(tracked, eye, best_deg, best_mm);
 }
 
-Finding seem_inverted(double as_given_deg, double inverted_deg, bool given_poses) {
-  return {Grade::fail,
-          fmt::format("the poses seem to be inverted: they fit to {:.1f} degrees as given, to {:.1f} the other way "
-                      "round",
-                      as_given_deg, inverted_deg),
-          given_poses
-              ? "the poses are to be tracker_from_sensor and marker_from_camera, and one of the two is the other way: "
-                "of the camera's, if they are where the board is in the camera's frame, as OpenCV and ArUco find it, "
-                "say --eye-poses-are camera_from_marker; of the tracker's, say --poses-are sensor_from_tracker; or w "
-                "is the first of a quaternion's four numbers: name them in a header, qw,qx,qy,qz"
-              : "if the poses are sensor_from_tracker, say so: --poses-are sensor_from_tracker; if w is the first of "
-                "the quaternion's four numbers, name them in a header: qw,qx,qy,qz"};
+/// What is to be said of the files, or no more said.
+std::string direction_advice(const StationsInOrder& in) {
+  const char* const tracker = in.sensor_inverted ? "leave --poses-are out" : "say --poses-are sensor_from_tracker";
+  if (!in.given_poses) {
+    return in.sensor_inverted ? "if the poses are tracker_from_sensor, leave --poses-are out"
+                              : "if the poses are sensor_from_tracker, say so: --poses-are sensor_from_tracker";
+  }
+  const char* const eye =
+      in.eye_inverted ? "if they are where the camera is in the board's frame, leave --eye-poses-are out"
+                      : "if they are where the board is in the camera's frame, as OpenCV and ArUco find it, say "
+                        "--eye-poses-are camera_from_marker";
+  return fmt::format(
+      "the poses are to be tracker_from_sensor and marker_from_camera, and one of the two is the other way: of the "
+      "camera's, {}; of the tracker's, {}",
+      eye, tracker);
+}
+
+Finding seem_inverted(double as_given_deg, double inverted_deg, const StationsInOrder& in) {
+  return {
+      Grade::fail,
+      fmt::format("the poses seem to be inverted: they fit to {:.1f} degrees as given, to {:.1f} the other way "
+                  "round",
+                  as_given_deg, inverted_deg),
+      direction_advice(in) + "; if w is the first of a quaternion's four numbers, name them in a header: qw,qx,qy,qz"};
 }
 
 /// Which of a position's axes stand for x, y and z, and with which signs.
@@ -224,7 +236,7 @@ std::optional<Finding> find_wrong_frames(const StationsInOrder& in) {
   double inverted_mm = position_misfit_mm(with_poses(in, [](const auto& pose) { return turned_round(pose); }));
   if (in.given_poses) inverted_mm = std::min(inverted_mm, position_misfit_mm(with_eyes_turned_round(in)));
   if (auto found = find_disorder(in, inverted_mm)) return found;
-  return seem_inverted(as_given_deg, inverted_deg, in.given_poses);
+  return seem_inverted(as_given_deg, inverted_deg, in);
 }
 
 }  // namespace birdseye::calibration

@@ -17,6 +17,7 @@ struct StationsInOrder {
   double square_mm = 0;                     ///< least distance of two corners; 0 if not known
   bool given_poses = false;                 ///< the camera's poses were given too, and may be the inverted ones
   bool time_offset = false;                 ///< is not known: it may move what the tracker says
+  bool sensor_inverted = false, eye_inverted = false;  ///< as HandEyeInput has them
 };
 
 /// What follows from the turns between stations alone, and from the tracker's distances against the camera's: whether

@@ -33,6 +33,8 @@ constexpr double kMuchNoisier = 4;
 /// Corners against the board where they fit it best.
 constexpr double kFineRmsPx = 1.5;
 constexpr double kUsableRmsPx = 4;
+/// By how much sensor or board may have moved between two stations.
+constexpr double kFineStepMm = 0.5, kUsableStepMm = 2;
 
 std::string joined(const std::vector<std::string>& names) {
   constexpr std::size_t kMost = 8;
@@ -59,7 +61,9 @@ void judge_stations(const HandEyeResult& r, Verdict& verdict) {
     verdict.add(Grade::pass, count);
   } else {
     verdict.add(used >= kFewStations ? Grade::marginal : Grade::fail,
-                fmt::format("{}, of {}", count, used >= kFewStations ? kEnoughStations : kFewStations),
+                used >= kFewStations
+                    ? fmt::format("{}; {} are needed for a pass", count, kEnoughStations)
+                    : fmt::format("{}; at least {} are needed ({} for a pass)", count, kFewStations, kEnoughStations),
                 fmt::format("take {} more, each turned another way", kEnoughStations - used));
   }
   if (r.outliers.empty()) return;
@@ -107,6 +111,22 @@ void judge_noise(const HandEyeResult& r, Verdict& verdict) {
   }
 }
 
+void judge_step(const HandEyeStep& step, Verdict& verdict) {
+  const double shift_mm = step.least_shift_mm(), turn_deg = step.least_turn_deg();
+  if (shift_mm <= kFineStepMm && turn_deg <= kFineSigmaDeg) return;
+  const bool far = shift_mm > kUsableStepMm || turn_deg > kUsableSigmaDeg;
+  verdict.add(
+      far ? Grade::fail : Grade::marginal,
+      fmt::format("the sensor slid on the scope, or the board moved, between {} and {}, or the tracker's field "
+                  "differs there: by {:.1f} mm at the board (at least {:.1f}) and {:.1f} deg (at least {:.1f}), "
+                  "{:.1f} sigmas where chance allows {:.1f}",
+                  step.before, step.after, step.shift_mm, shift_mm, step.turn_deg, turn_deg, step.sigmas,
+                  step.limit_sigmas),
+      "fix the sensor to the scope, and the board to its place, and calibrate again; if both were firm, keep "
+      "metal away or map the field (birdseye calibrate field), and take the stations by turns here and there, "
+      "not all of one side first");
+}
+
 /// Several findings may give the same advice.
 void keep_once(std::vector<std::string>& steps) {
   std::vector<std::string> out;
@@ -140,6 +160,7 @@ Verdict judge(const HandEyeResult& r) {
   judge_stations(r, verdict);
   if (r.held_out_median_px > 0) name_odd(r, verdict);
   judge_noise(r, verdict);
+  if (r.step) judge_step(*r.step, verdict);
   const std::string more = "take more stations, and turn the scope more between them";
   verdict.judge("hand-eye's part of the error at the board (one sigma)", r.sigma_at_board_mm(), "mm", kFineSigmaMm,
                 kUsableSigmaMm, more);

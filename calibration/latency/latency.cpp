@@ -84,19 +84,32 @@ void take_scan(const LagScan& scan, Latency& latency) {
   latency.at_edge = scan.at_edge;
   latency.rival_lag_s = scan.rival_s;
   latency.rival_correlation = scan.rival;
+  latency.far_lag_s = scan.far_s;
+  latency.far_correlation = scan.far;
   latency.curves.lag_s = scan.lags_s;
   latency.curves.correlation = scan.correlation;
 }
 
-/// The samples of b that a covers at the best lag, and at the rival's where it needs them too.
+/// The samples of b that a covers at both lags.
 template <typename Sample>
-std::vector<Sample> covered(const MotionSpline& a, const std::vector<Sample>& b, const LagScan& scan) {
+std::vector<Sample> covered(const MotionSpline& a, const std::vector<Sample>& b, double lag_s, double other_lag_s) {
   std::vector<Sample> kept;
   for (const Sample& sample : b) {
-    if (is_covered(a, sample, scan.best_s) && (!scan.has_rival || is_covered(a, sample, scan.rival_s)))
-      kept.push_back(sample);
+    if (is_covered(a, sample, lag_s) && is_covered(a, sample, other_lag_s)) kept.push_back(sample);
   }
   return kept;
+}
+
+/// At the best lag, and at the rival's where there is one.
+template <typename Sample>
+std::vector<Sample> covered(const MotionSpline& a, const std::vector<Sample>& b, const LagScan& scan) {
+  return covered(a, b, scan.best_s, scan.has_rival ? scan.rival_s : scan.best_s);
+}
+
+/// Whether a far peak is high enough to be the truth: that one explains no less than the best within, but for noise.
+bool is_far_rival(const LagScan& scan) {
+  constexpr double kNoLess = 0.05;
+  return scan.has_far && scan.far >= scan.best - kNoLess;
 }
 
 void take_fit(const TimingFit& fit, Latency& latency) {
@@ -130,10 +143,11 @@ bool is_worth_a_fit(const Latency& latency) {
          latency.correlation >= kLeastCorrelation;
 }
 
+constexpr std::size_t kFewestFitted = 40;
+
 bool too_few(const std::size_t samples, Latency& latency) {
-  constexpr std::size_t kFewest = 40;
   latency.determined = false;
-  return samples < kFewest;
+  return samples < kFewestFitted;
 }
 
 }  // namespace
@@ -157,7 +171,8 @@ Result<Latency> find_latency(std::span<const TimedRotation> a, std::span<const T
   const MotionSpline spline(*of_a);
   const RateGrid grid = rate_grid(spline, first_time(*of_a), last_time(*of_a), false);
   const RateSignal rates = turn_rates(*of_b, std::max(kRateWindowS, 1.2 / latency.b.rate_hz));
-  const LagScan scan = scan_lags(grid, rates, RateMap::rotation, settings.most_offset_s);
+  const LagScan scan = scan_lags(grid, rates, RateMap::rotation, settings.most_offset_s, settings.farthest_s);
+  latency.sought_s = settings.most_offset_s;
   take_scan(scan, latency);
   take_speeds(grid, rates, latency.curves);
   const MotionSamples used = covered(spline, *of_b, scan);
@@ -171,6 +186,13 @@ Result<Latency> find_latency(std::span<const TimedRotation> a, std::span<const T
   if (scan.has_rival) {
     RotationTiming other(spline, used, scan.rival_turn, scan.rival_s);
     latency.rival_sigmas = sigmas_worse(fit, fit_timing(other, scan.rival_s, settings.find_drift), model.times_s());
+  }
+  if (is_far_rival(scan)) {
+    const auto both = covered(spline, *of_b, scan.best_s, scan.far_s);  // of its own: it takes nothing from the fit
+    if (both.size() < kFewestFitted) return latency;                    // what it is worth cannot be told
+    RotationTiming near(spline, both, scan.turn, scan.best_s), distant(spline, both, scan.far_turn, scan.far_s);
+    const TimingFit of_near = fit_timing(near, scan.best_s, settings.find_drift);
+    latency.far_sigmas = sigmas_worse(of_near, fit_timing(distant, scan.far_s, settings.find_drift), near.times_s());
   }
   return latency;
 }
@@ -189,7 +211,8 @@ Result<Latency> find_latency(std::span<const TimedMotionPose> a, std::span<const
   const MotionSpline spline(*of_a);
   const RateGrid grid = rate_grid(spline, first_time(*of_a), last_time(*of_a), true);
   const RateSignal rates = image_rates(*of_b);
-  const LagScan scan = scan_lags(grid, rates, RateMap::linear, settings.most_offset_s);
+  const LagScan scan = scan_lags(grid, rates, RateMap::linear, settings.most_offset_s, settings.farthest_s);
+  latency.sought_s = settings.most_offset_s;
   take_scan(scan, latency);
   take_speeds(grid, rates, latency.curves);
   const std::vector<ImageMotion> used = covered(spline, *of_b, scan);
@@ -205,6 +228,13 @@ Result<Latency> find_latency(std::span<const TimedMotionPose> a, std::span<const
   if (scan.has_rival) {
     ImageTiming other(spline, used, scan.rival_s);
     latency.rival_sigmas = sigmas_worse(fit, fit_timing(other, scan.rival_s, settings.find_drift), model.times_s());
+  }
+  if (is_far_rival(scan)) {
+    const auto both = covered(spline, *of_b, scan.best_s, scan.far_s);  // of its own: it takes nothing from the fit
+    if (both.size() < kFewestFitted) return latency;                    // what it is worth cannot be told
+    ImageTiming near(spline, both, scan.best_s), distant(spline, both, scan.far_s);
+    const TimingFit of_near = fit_timing(near, scan.best_s, settings.find_drift);
+    latency.far_sigmas = sigmas_worse(of_near, fit_timing(distant, scan.far_s, settings.find_drift), near.times_s());
   }
   return latency;
 }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -33,7 +34,10 @@ struct ImageMotion {
 
 struct LatencySettings {
   double most_offset_s = 1;  ///< offsets are sought from minus this to plus this
-  bool find_drift = true;    ///< false: the two clocks are known to run at one rate
+  /// So far either way is looked whether a lag beyond explains the streams better, for then the best within is no
+  /// answer.
+  double farthest_s = 4;
+  bool find_drift = true;  ///< false: the two clocks are known to run at one rate
 };
 
 /// What a stream holds where the other is near, for judging it. Speeds are taken over 0.3 s, so that noise counts for
@@ -74,7 +78,13 @@ struct Latency {
   double rival_lag_s = 0;                                  ///< the second best peak; 0 where there is none
   double rival_correlation = 0;
   double rival_sigmas = 0;  ///< by how many standard errors the best lag explains the streams better than the rival
-  double overlap_s = 0;     ///< where both streams tell something, without holes
+  double sought_s = 0;      ///< LatencySettings::most_offset_s
+  double far_lag_s = 0;     ///< the best peak beyond what was sought; its correlation is 0 where there is none
+  double far_correlation = 0;
+  /// As rival_sigmas, of the far lag; below 0 where that one explains the streams better. Empty where the two were not
+  /// compared: the best within is no answer, the far one explains plainly less, or too few samples are covered at both.
+  std::optional<double> far_sigmas;
+  double overlap_s = 0;  ///< where both streams tell something, without holes
   StreamMotion a, b;
   LatencyCurves curves;
 };

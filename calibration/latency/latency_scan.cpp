@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 
 #include "calibration/geometry/linear_algebra.hpp"
@@ -12,6 +13,7 @@ namespace birdseye::calibration {
 namespace {
 
 constexpr double kLagStepS = 0.01;
+constexpr int kFarStep = 3;               // in kLagStepS: a hand's motion is alike over twice as long
 constexpr Eigen::Index kMostRows = 6000;  // of b: more make no peak clearer
 constexpr double kLeastShare = 0.5;       // of the rows that meet at the lag where most do, for another lag to count
 constexpr Eigen::Index kFewestMeeting = 10;
@@ -114,29 +116,65 @@ void find_rival(LagScan& scan, std::size_t best) {
   }
 }
 
+struct Scanned {
+  double lag_s = 0, correlation = 0, met = 0;
+};
+
+/// The best peak of those outside of the range. `all` are in order of lag, the range's own among them.
+void find_far(LagScan& scan, const std::vector<Scanned>& all, double most_lag_s,
+              const std::function<Scanned(int)>& at) {
+  std::vector<double> c;
+  std::size_t best = 0;
+  for (const Scanned& one : all) {
+    if (one.lag_s <= scan.best_s) best = c.size();
+    c.push_back(one.correlation);
+  }
+  for (std::size_t i = 0; i < c.size(); ++i) {
+    if (std::abs(all[i].lag_s) <= most_lag_s || !is_peak(c, i)) continue;
+    const auto from = c.begin() + static_cast<std::ptrdiff_t>(std::min(i, best));
+    const auto to = c.begin() + static_cast<std::ptrdiff_t>(std::max(i, best));
+    if (*std::min_element(from, to) > c[i] - kDip && c[i] <= scan.best) continue;
+    // Between two of the wide steps it may be higher.
+    const int middle = static_cast<int>(std::lround(all[i].lag_s / kLagStepS));
+    for (int n = middle - kFarStep + 1; n < middle + kFarStep; ++n) {
+      const Scanned near = at(n);
+      if (std::abs(near.lag_s) <= most_lag_s || near.correlation <= scan.far) continue;
+      scan.has_far = true;
+      scan.far = near.correlation;
+      scan.far_s = near.lag_s;
+    }
+  }
+}
+
 }  // namespace
 
-LagScan scan_lags(const RateGrid& a, const RateSignal& b, RateMap map, double most_lag_s) {
+LagScan scan_lags(const RateGrid& a, const RateSignal& b, RateMap map, double most_lag_s, double farthest_s) {
   RateGrid clipped_a = a;
   RateSignal clipped_b = b;
   clip(clipped_a.rates);
   clip(clipped_b.rates);
-  LagScan scan;
-  std::vector<Eigen::Index> met;
-  const int steps = static_cast<int>(std::lround(most_lag_s / kLagStepS));
-  for (int n = -steps; n <= steps; ++n) {
+  const auto at = [&](int n) {
     const double lag_s = n * kLagStepS;
     const auto meeting = meet(clipped_a, clipped_b, lag_s);
     const double c = !meeting                   ? 0
                      : map == RateMap::rotation ? rotation_correlation(*meeting, nullptr)
                                                 : linear_correlation(*meeting);
-    scan.lags_s.push_back(lag_s);
-    scan.correlation.push_back(c);
-    met.push_back(meeting ? meeting->a.rows() : 0);
-  }
-  const auto most_met = static_cast<double>(*std::max_element(met.begin(), met.end()));
-  for (std::size_t i = 0; i < met.size(); ++i) {
-    if (static_cast<double>(met[i]) < kLeastShare * most_met) scan.correlation[i] = 0;
+    return Scanned{lag_s, c, meeting ? static_cast<double>(meeting->a.rows()) : 0};
+  };
+  LagScan scan;
+  std::vector<Scanned> sought;
+  const int steps = static_cast<int>(std::lround(most_lag_s / kLagStepS));
+  for (int n = -steps; n <= steps; ++n) sought.push_back(at(n));
+  double most_met = 0;
+  for (const Scanned& one : sought) most_met = std::max(most_met, one.met);
+  const auto counted = [&](Scanned one) {
+    if (one.met < kLeastShare * most_met) one.correlation = 0;
+    return one;
+  };
+  for (Scanned& one : sought) {
+    one = counted(one);
+    scan.lags_s.push_back(one.lag_s);
+    scan.correlation.push_back(one.correlation);
   }
   const auto top = std::max_element(scan.correlation.begin(), scan.correlation.end());
   const auto best = static_cast<std::size_t>(top - scan.correlation.begin());
@@ -144,9 +182,18 @@ LagScan scan_lags(const RateGrid& a, const RateSignal& b, RateMap map, double mo
   scan.best = *top;
   scan.at_edge = best == 0 || best + 1 == scan.lags_s.size();
   find_rival(scan, best);
+  const auto counted_at = [&](int n) { return counted(at(n)); };
+  std::vector<Scanned> all = sought;
+  const int farthest = static_cast<int>(std::lround(farthest_s / kLagStepS));
+  for (int n = steps + kFarStep; n <= farthest; n += kFarStep) {
+    all.insert(all.begin(), counted_at(-n));
+    all.push_back(counted_at(n));
+  }
+  find_far(scan, all, most_lag_s, counted_at);
   if (map == RateMap::rotation) {
     if (const auto meeting = meet(clipped_a, clipped_b, scan.best_s)) rotation_correlation(*meeting, &scan.turn);
     if (const auto meeting = meet(clipped_a, clipped_b, scan.rival_s)) rotation_correlation(*meeting, &scan.rival_turn);
+    if (const auto meeting = meet(clipped_a, clipped_b, scan.far_s)) rotation_correlation(*meeting, &scan.far_turn);
   }
   return scan;
 }

@@ -24,15 +24,20 @@ struct LagScan {
   bool at_edge = false;
   bool has_rival = false;
   double rival_s = 0, rival = 0;  ///< the next best peak that a dip parts from the best
-  /// With RateMap::rotation: the rotation that brings a's rates to b's, at the best lag and at the rival.
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity(), rival_turn = Eigen::Matrix3d::Identity();
+  bool has_far = false;
+  double far_s = 0,
+         far = 0;  ///< the best peak outside of the range, where a dip parts it from the best or it is higher
+  /// With RateMap::rotation: the rotation that brings a's rates to b's, at the best lag, at the rival and at the far
+  /// one.
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity(), rival_turn = turn, far_turn = turn;
 };
 
 /// How b's rates may follow from a's: by a rotation alone, or by any linear map.
 enum class RateMap { rotation, linear };
 
 /// The correlation of b's rates with a's rates under the best map, 0 to 1, at each lag (b later than a) from
-/// -most_lag_s to most_lag_s. Means are removed and extremes clipped.
-LagScan scan_lags(const RateGrid& a, const RateSignal& b, RateMap map, double most_lag_s);
+/// -most_lag_s to most_lag_s, and in wider steps for far peaks to farthest_s either way, as far as half as many rows
+/// still meet. Means are removed and extremes clipped.
+LagScan scan_lags(const RateGrid& a, const RateSignal& b, RateMap map, double most_lag_s, double farthest_s);
 
 }  // namespace birdseye::calibration

@@ -13,6 +13,8 @@ namespace {
 constexpr const char* kHowToMove =
     "turn the scope to and fro about two axes, by 20 degrees, about once a second but not evenly, for 20 s";
 
+constexpr const char* kNotEvenly = "do not swing evenly: change pace, width and direction while you record";
+
 void judge_motion(const StreamMotion& motion, const std::string& name, Verdict& verdict) {
   for (const std::string& odd : motion.odd) verdict.add(Grade::marginal, odd);
   if (is_moving(motion)) return;
@@ -45,6 +47,37 @@ void tell_part(const Latency& latency, const std::string& a_name, const std::str
                                        latency.overlap_s, latency.a.recorded_s, a_name, latency.b.recorded_s, b_name));
 }
 
+/// Whether a lag beyond what was sought explains the streams better than the best within.
+bool is_beyond(const Latency& latency) {
+  if (latency.far_correlation < kGoodCorrelation) return false;
+  if (latency.far_sigmas) return *latency.far_sigmas <= -kRivalSigmas;
+  const bool no_answer = latency.at_edge || latency.correlation < kLeastCorrelation;
+  return no_answer && latency.far_correlation > latency.correlation + kFarBetter;
+}
+
+/// Whether one may explain them as well.
+bool has_far_rival(const Latency& latency) {
+  return latency.far_correlation > 0 && latency.far_correlation >= latency.correlation - kFarBetter &&
+         latency.far_sigmas.value_or(0) < kRivalSigmas;
+}
+
+void judge_far_rival(const Latency& latency, Verdict& verdict) {
+  const std::string lags = fmt::format("{:.0f} ms, beyond the {:.0f} ms either way that are sought, ",
+                                       1e3 * latency.far_lag_s, 1e3 * latency.sought_s);
+  const std::string than = fmt::format("{:.0f} ms (correlation {:.2f} and {:.2f})", 1e3 * latency.lag_s,
+                                       latency.far_correlation, latency.correlation);
+  if (latency.far_sigmas) {
+    verdict.add(Grade::fail, fmt::format("the motion repeats itself: {}explains it nearly as well as {}", lags, than),
+                kNotEvenly);
+    return;
+  }
+  verdict.add(latency.far_correlation > latency.correlation ? Grade::fail : Grade::marginal,
+              fmt::format("whether {}explains the motion as well as {} cannot be told: too few samples are covered at "
+                          "both",
+                          lags, than),
+              "record for longer");
+}
+
 /// What makes an offset no answer. True if there is such a thing.
 bool judge_peak(const Latency& latency, Verdict& verdict) {
   if (latency.overlap_s < kShortestS) {
@@ -53,7 +86,15 @@ bool judge_peak(const Latency& latency, Verdict& verdict) {
                 "record for 20 s");
   }
   if (verdict.grade == Grade::fail) return true;
-  if (latency.correlation < kLeastCorrelation) {
+  if (is_beyond(latency)) {
+    verdict.add(Grade::fail,
+                fmt::format("the motions agree best at a lag of {:.0f} ms (correlation {:.2f}), beyond the {:.0f} ms "
+                            "either way that are sought; of these {:.0f} ms is best (correlation {:.2f})",
+                            1e3 * latency.far_lag_s, latency.far_correlation, 1e3 * latency.sought_s,
+                            1e3 * latency.lag_s, latency.correlation),
+                "see that both streams are stamped by one clock: one that is late by so much is stamped by another, or "
+                "waits somewhere");
+  } else if (latency.correlation < kLeastCorrelation) {
     verdict.add(Grade::fail,
                 fmt::format("the two motions do not agree at any lag: correlation {:.2f}, of at least {:g}",
                             latency.correlation, kLeastCorrelation),
@@ -69,7 +110,9 @@ bool judge_peak(const Latency& latency, Verdict& verdict) {
         fmt::format("the motion repeats itself: {:.0f} ms explains it nearly as well as {:.0f} ms (correlation "
                     "{:.2f} and {:.2f})",
                     1e3 * latency.rival_lag_s, 1e3 * latency.lag_s, latency.rival_correlation, latency.correlation),
-        "do not swing evenly: change pace, width and direction while you record");
+        kNotEvenly);
+  } else if (has_far_rival(latency)) {
+    judge_far_rival(latency, verdict);
   }
   return verdict.grade == Grade::fail;
 }

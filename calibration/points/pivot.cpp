@@ -4,92 +4,28 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <random>
 
 #include "calibration/base/counted.hpp"
 #include "calibration/base/median.hpp"
-#include "calibration/base/student95.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/points/pivot_covariance.hpp"
+#include "calibration/points/pivot_tip.hpp"
 
 namespace birdseye::calibration {
 
 namespace {
 
-using Poses = std::vector<PivotPose>;
-using Indices = std::vector<std::size_t>;
+using pivot::covariance_of, pivot::Indices, pivot::kSides, pivot::leaves_open, pivot::Poses, pivot::shaft_of,
+    pivot::sides_of, pivot::solve, pivot::TipEquations;
 
 constexpr std::size_t kLeastPoses = 4;
 constexpr int kSamples = 500;  // where half of all poses are wrong, one of 16 samples of four has none of them
 /// 2.5 deviations of a normal distribution in one dimension; in three the same share lies within 3.33.
 constexpr double kOutlier = 3.33;
-/// The share of a normal distribution's variance in three dimensions that lies within: P(chi2_5 < k^2)/P(chi2_3 < k^2).
-constexpr double kVarianceWithin = 0.961;
-/// A direction that swings less than this, squared, is rounding: the tip along it is left alone.
-constexpr double kOpen = 1e-10;
-constexpr int kSides = 8;
-constexpr std::size_t kLeastGroups = 5;  // fewer say too little about how groups differ
-
-/// Mean pose of each divot, of those used.
-struct Means {
-  std::vector<Eigen::Matrix3d> rotation;
-  std::vector<Eigen::Vector3d> translation;
-  std::vector<double> count;
-};
-
-Means means_of(const Poses& poses, const Indices& used, std::size_t divots) {
-  Means m{std::vector<Eigen::Matrix3d>(divots, Eigen::Matrix3d::Zero()),
-          std::vector<Eigen::Vector3d>(divots, Eigen::Vector3d::Zero()), std::vector<double>(divots, 0)};
-  for (const std::size_t i : used) {
-    m.rotation[poses[i].divot] += poses[i].tracker_from_sensor.rotation();
-    m.translation[poses[i].divot] += poses[i].tracker_from_sensor.translation();
-    m.count[poses[i].divot] += 1;
-  }
-  for (std::size_t k = 0; k < divots; ++k) {
-    if (m.count[k] == 0) continue;
-    m.rotation[k] /= m.count[k];
-    m.translation[k] /= m.count[k];
-  }
-  return m;
-}
-
-/// The tip's normal equations once each pivot is replaced by the mean of R t + q, and their solution of least length.
-struct TipEquations {
-  Means means;
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d tip = Eigen::Vector3d::Zero();
-  [[nodiscard]] Eigen::Vector3d pivot(std::size_t divot) const {
-    return means.rotation[divot] * tip + means.translation[divot];
-  }
-};
-
-TipEquations solve(const Poses& poses, const Indices& used, std::size_t divots) {
-  TipEquations out;
-  out.means = means_of(poses, used, divots);
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (const std::size_t i : used) {
-    const auto& pose = poses[i].tracker_from_sensor;
-    const Eigen::Matrix3d swing = pose.rotation() - out.means.rotation[poses[i].divot];
-    out.normal += swing.transpose() * swing;
-    right -= swing.transpose() * (pose.translation() - out.means.translation[poses[i].divot]);
-  }
-  const SymmetricEigen<3> eigen = symmetric_eigen(out.normal);
-  for (int k = 0; k < 3; ++k) {
-    const Eigen::Vector3d direction = eigen.vectors.col(k);
-    if (eigen.values[k] > kOpen * static_cast<double>(used.size()))
-      out.inverse += direction * direction.transpose() / eigen.values[k];
-  }
-  out.tip = out.inverse * right;
-  return out;
-}
-
-/// From sensor to tip; poses that tell no tip may show any direction.
-Eigen::Vector3d shaft_of(const Eigen::Vector3d& tip_mm) {
-  constexpr double kNone_mm = 1e-6;
-  return tip_mm.norm() > kNone_mm ? Eigen::Vector3d(tip_mm.normalized()) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
-}
 
 Eigen::Vector3d median_point(const std::vector<Eigen::Vector3d>& points) {
   Eigen::Vector3d out;
@@ -201,93 +137,6 @@ Indices agreeing(const Poses& poses, std::size_t divots, const TipEquations& all
   return used;
 }
 
-/// To which of kSides sides each pose leans, from the mean of its divot.
-std::vector<int> sides_of(const Poses& poses, const TipEquations& linear) {
-  std::vector<int> sides;
-  for (const PivotPose& pose : poses) {
-    const Eigen::Vector3d mean = (linear.means.rotation[pose.divot] * shaft_of(linear.tip)).normalized();
-    const Eigen::Vector3d shaft = pose.tracker_from_sensor.rotation() * shaft_of(linear.tip);
-    const Eigen::Vector3d x = mean.unitOrthogonal();
-    const double turn = std::atan2(shaft.dot(mean.cross(x)), shaft.dot(x)) / (360 * kRadPerDeg) + 0.5;
-    // A pointer that did not lean at all, or has no length, leans to no side: any will do.
-    sides.push_back(turn >= 0 && turn < 1 ? static_cast<int>(turn * kSides) : 0);
-  }
-  return sides;
-}
-
-/// White's covariance of the tip, each residual as it would be had the fit not seen its pose (J. MacKinnon and H.
-/// White, 1985): with few poses it is too small otherwise.
-Eigen::Matrix3d independent_covariance(const Poses& poses, const Indices& used, const TipEquations& linear) {
-  Eigen::Matrix3d scores = Eigen::Matrix3d::Zero();
-  for (const std::size_t i : used) {
-    const auto& pose = poses[i].tracker_from_sensor;
-    const std::size_t divot = poses[i].divot;
-    const Eigen::Matrix3d swing = pose.rotation() - linear.means.rotation[divot];
-    const Eigen::Matrix3d unseen =
-        (1 - 1 / linear.means.count[divot]) * Eigen::Matrix3d::Identity() - swing * linear.inverse * swing.transpose();
-    const Eigen::Vector3d residual = pose * linear.tip - linear.pivot(divot);
-    // A pose that alone tells some part of the tip has no residual there.
-    const Eigen::Vector3d score = swing.transpose() * solve_least_norm(unseen, residual);
-    scores += score * score.transpose();
-  }
-  return linear.inverse * scores * linear.inverse / kVarianceWithin;
-}
-
-/// Which poses may err alike: those of a divot, where there are divots enough, or those that lean to one side. A field
-/// that metal bends errs alike there, however many poses there are.
-std::vector<std::size_t> places_of(const Poses& poses, const TipEquations& linear) {
-  std::vector<std::size_t> groups;
-  if (linear.means.count.size() >= kLeastGroups) {
-    for (const PivotPose& pose : poses) groups.push_back(pose.divot);
-  } else {
-    for (const int side : sides_of(poses, linear)) groups.push_back(static_cast<std::size_t>(side));
-  }
-  return groups;
-}
-
-/// The same for neighbours in time, which a tracker's filter and a hand that leans on one side push alike. All poses in
-/// one group where they have no times.
-std::vector<std::size_t> moments_of(const Poses& poses) {
-  constexpr std::size_t kMoments = 12;
-  Indices order(poses.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return poses[i].time_s; });
-  std::vector<std::size_t> groups(poses.size(), 0);
-  if (poses[order.front()].time_s == poses[order.back()].time_s) return groups;
-  for (std::size_t k = 0; k < order.size(); ++k) groups[order[k]] = k * kMoments / order.size();
-  return groups;
-}
-
-/// The tip's variance where the errors of all poses of a group may be one, mm^2 summed over the axes, as much larger as
-/// a 95 % bound by so few groups has to be. 0 where groups are too few to tell.
-double variance_between(const Poses& poses, const Indices& used, const TipEquations& linear,
-                        const std::vector<std::size_t>& groups) {
-  std::vector<Eigen::Vector3d> sums(*std::ranges::max_element(groups) + 1, Eigen::Vector3d::Zero());
-  if (sums.size() < kLeastGroups) return 0;
-  for (const std::size_t i : used) {
-    const auto& pose = poses[i].tracker_from_sensor;
-    const Eigen::Matrix3d swing = pose.rotation() - linear.means.rotation[poses[i].divot];
-    sums[groups[i]] += swing.transpose() * (pose * linear.tip - linear.pivot(poses[i].divot));
-  }
-  double squares = 0;
-  for (const Eigen::Vector3d& sum : sums) squares += (linear.inverse * sum).squaredNorm();
-  const auto count = static_cast<double>(sums.size());
-  const double few = student95(static_cast<int>(sums.size()) - 1) / kNormal95;
-  return few * few * count / (count - 1) * squares;
-}
-
-/// White's, as much larger as groups by place and by time say that it is too small (two ways: A. Cameron, J. Gelbach
-/// and D. Miller, 2011).
-Eigen::Matrix3d covariance_of(const Poses& poses, const Indices& used, const TipEquations& linear) {
-  Eigen::Matrix3d independent = independent_covariance(poses, used, linear);
-  const double alone_mm2 = independent.trace();
-  if (!(alone_mm2 > 0)) return independent;
-  double times = 1;
-  for (const auto& groups : {places_of(poses, linear), moments_of(poses)})
-    times += std::max(0.0, variance_between(poses, used, linear, groups) / alone_mm2 - 1);
-  return times * independent;
-}
-
 PivotTilt tilt_of(const Poses& poses, const Indices& used, const TipEquations& linear) {
   PivotTilt tilt;
   std::vector<Eigen::Vector3d> shafts;
@@ -396,7 +245,12 @@ Result<Pivot> solve_pivot(std::span<const PivotPose> given) {
   const TipEquations linear = solve(poses, used, divots);
   out.robust = fit_of(poses, used, linear);
   out.tip_covariance_mm2 = covariance_of(poses, used, linear);
-  out.tip_sigma_mm = std::sqrt(std::max(0.0, symmetric_eigenvalues(out.tip_covariance_mm2)[2]));
+  if (leaves_open(linear, used.size())) {
+    out.tip_covariance_mm2.setConstant(std::numeric_limits<double>::infinity());
+    out.tip_sigma_mm = std::numeric_limits<double>::infinity();
+  } else {
+    out.tip_sigma_mm = std::sqrt(std::max(0.0, symmetric_eigenvalues(out.tip_covariance_mm2)[2]));
+  }
   out.tilt = tilt_of(poses, used, linear);
   out.held_out_mm = held_out_of(poses, used, linear);
   std::vector<Eigen::Vector3d> offsets;

@@ -107,8 +107,15 @@ Verdict judge_pivot(const Pivot& pivot) {
     verdict.judge("held-out error", pivot.held_out_mm, "mm rms", kRms_mm, kWorstRms_mm,
                   "tilt to all sides, so that no side is told by the others alone");
   }
-  verdict.judge("standard error of the tip", pivot.tip_sigma_mm, "mm", kSigma_mm, kWorstSigma_mm,
-                "tilt further and record more poses");
+  if (std::isfinite(pivot.tip_sigma_mm)) {
+    verdict.judge("standard error of the tip", pivot.tip_sigma_mm, "mm", kSigma_mm, kWorstSigma_mm,
+                  "tilt further and record more poses");
+  } else {
+    verdict.add(Grade::fail,
+                fmt::format("no standard error of the tip: along {} of the sensor the poses leave it open",
+                            text_of(pivot.tilt.weakest_in_sensor)),
+                "tilt to all sides");
+  }
   if (pivot.slid_mm > kChance * pivot.slid_sigma_mm && pivot.slid_mm > kSlid_mm) {
     verdict.add(
         pivot.slid_mm > kWorstSlid_mm ? Grade::fail : Grade::marginal,

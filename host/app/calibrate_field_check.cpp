@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <regex>
 #include <set>
 #include <string>
 #include <string_view>
@@ -24,6 +26,19 @@ namespace {
 
 using calibration::CheckedPlace;
 using calibration::FieldCheck;
+
+/// The history is one of days: a slip of the hand would stand in it for good.
+std::string is_day(const std::string& when) {
+  static const std::regex kDay("([0-9]{4})-([0-9]{2})-([0-9]{2})(T([01][0-9]|2[0-3]):[0-5][0-9])?");
+  std::smatch part;
+  if (std::regex_match(when, part, kDay)) {
+    const std::chrono::year_month_day day{std::chrono::year(std::stoi(part[1])),
+                                          std::chrono::month(static_cast<unsigned>(std::stoi(part[2]))),
+                                          std::chrono::day(static_cast<unsigned>(std::stoi(part[3])))};
+    if (day.ok()) return "";
+  }
+  return fmt::format("\"{}\" is no day: give it as 2026-11-29, or with the time, 2026-11-29T08:30", when);
+}
 
 constexpr std::size_t kDateLength = std::string_view("2026-11-29").size();
 
@@ -166,7 +181,7 @@ CLI::App* add_calibrate_field_check(CLI::App& field, CommandStatus& status) {
       ->type_name("FILE");
   check->add_option("--field", options->field, "the map that the appliance uses, where --measured was taken without it")
       ->type_name("FILE");
-  check->add_option("--when", options->when, "what the day is called; now, if left out");
+  check->add_option("--when", options->when, "the day, as 2026-11-29; now, if left out")->check(is_day);
   check->add_option("--json", options->results.json, "figures, verdict and reasons")->type_name("FILE");
   check->add_option("--report", options->results.report, "a page with the chart (HTML)")->type_name("FILE");
   check->callback([options, &status] { run(*options, status); });

@@ -286,8 +286,8 @@ void run(const CLI::App& command, CalibrateHandEyeOptions& options, CommandStatu
     recording->input.tracker_noise =
         calibration::TrackerNoise{options.position_sigma_mm, options.angle_sigma_deg * kRadPerDeg};
   recording->directions_said = !options.poses_are.direction.empty() && !options.eye_direction.empty();
-  recording->sensor_inverted = files.of_sensor.inverted;
-  recording->eye_inverted = files.of_eye.inverted;
+  recording->input.sensor_inverted = files.of_sensor.inverted;
+  recording->input.eye_inverted = files.of_eye.inverted;
   auto found = solve_hand_eye(*recording, angles, !files.eye_poses.empty());
   if (!found) return status.refuse(found.error());
   const std::string doubt = tell_doubts(*source, *field, found->verdict);

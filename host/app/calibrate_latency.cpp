@@ -10,6 +10,7 @@
 #include "host/app/calibrate_commands.hpp"
 #include "host/app/pose_options.hpp"
 #include "host/app/results.hpp"
+#include "host/calibrate/latency_advice.hpp"
 #include "host/calibrate/latency_report.hpp"
 #include "host/calibrate/latency_streams.hpp"
 #include "host/calibrate/time_hint.hpp"
@@ -41,29 +42,9 @@ struct LatencyFound {
   StreamNames names;
   std::string advice;
   nlohmann::json more = nlohmann::json::object();
+  LatencySetting setting;
   Drops drops;
 };
-
-/// What to do about it, for an appliance. The times of frames follow from [camera] delay_ms, those of poses from
-/// [tracker] delay_ms: raising the first makes frames earlier.
-std::string advice_of(const Latency& latency, const std::optional<double>& delay_ms) {
-  const double late_ms = latency.offset_ms;
-  if (latency.offset_ci95_ms[0] < 0 && latency.offset_ci95_ms[1] > 0)
-    return fmt::format(
-        "the frames' times agree with the tracker's: {:.1f} ms is within the interval of 0; leave "
-        "delay_ms as it is",
-        late_ms);
-  const bool late = late_ms > 0;
-  std::string text = fmt::format("the frames' times are {:.1f} ms too {} against the tracker's: ", std::abs(late_ms),
-                                 late ? "late" : "early");
-  if (delay_ms && *delay_ms + late_ms >= 0) {
-    text += fmt::format("set [camera] delay_ms to {:.1f}", *delay_ms + late_ms);
-  } else {
-    text += fmt::format("{} [camera] delay_ms by {:.1f}", late ? "raise" : "lower", std::abs(late_ms));
-  }
-  return text + fmt::format("; or, where the camera stamps its frames itself, {} [tracker] delay_ms by as much",
-                            late ? "lower" : "raise");
-}
 
 Result<LatencyFound> of_appliance(const CalibrateLatencyOptions& options, const AdmittedRecording& recording,
                                   Progress& progress) {
@@ -86,13 +67,20 @@ Result<LatencyFound> of_appliance(const CalibrateLatencyOptions& options, const 
   auto latency = calibration::find_latency(std::span<const calibration::TimedMotionPose>(streams->tracker),
                                            std::span<const calibration::ImageMotion>(streams->video), options.settings);
   if (!latency) return Error{latency.error().code, latency.error().what + " (a: the tracker, b: the video)"};
-  LatencyFound found{*std::move(latency), {"tracker", "video", "px/s"}, {}, {}, streams->drops};
-  found.advice = advice_of(found.latency, options.delay_ms);
+  LatencyFound found{*std::move(latency),
+                     {"tracker", "video", "px/s"},
+                     {},
+                     {},
+                     {options.delay_ms, streams->in_force_ms, !options.paths.record.empty()},
+                     streams->drops};
+  const LatencyAdvice advice = advise_latency(found.latency, found.setting);
+  found.advice = advice.text;
   found.more = {{"method", "picture motion"},
                 {"bird", streams->bird},
                 {"frames", streams->frames},
                 {"frames_without_motion", streams->frames_without_motion}};
-  if (options.delay_ms) found.more["camera_delay_ms"] = *options.delay_ms + found.latency.offset_ms;
+  if (advice.camera_delay_ms) found.more["camera_delay_ms"] = *advice.camera_delay_ms;
+  if (streams->in_force_ms) found.more["record_latency_ms"] = *streams->in_force_ms;
   return found;
 }
 
@@ -138,7 +126,7 @@ Result<LatencyFound> of_files(const CalibrateLatencyOptions& options, const Admi
       return Error{Errc::bad_value, hint};
     return Error{latency.error().code, latency.error().what + " (a: --poses, b: --eye-poses)"};
   }
-  LatencyFound found{*std::move(latency), {"poses", "eye poses", "rad/s"}, {}, {{"method", "poses"}}, {}};
+  LatencyFound found{*std::move(latency), {"poses", "eye poses", "rad/s"}, {}, {{"method", "poses"}}, {}, {}};
   found.advice = fmt::format("the times of {} are {:.2f} ms too {} against those of {}: {} that",
                              options.eye_poses.filename().string(), std::abs(found.latency.offset_ms),
                              found.latency.offset_ms > 0 ? "late" : "early", options.poses.filename().string(),
@@ -196,6 +184,7 @@ void run(const CLI::App& command, const CalibrateLatencyOptions& options, Comman
   if (!found) return status.refuse(found.error());
   Verdict verdict = calibration::latency_verdict(found->latency, found->names.a, found->names.b);
   for (const std::string& reason : odd.reasons) verdict.add(Grade::pass, reason);
+  if (verdict.grade != Grade::fail) judge_in_force(found->latency, found->setting, verdict);
   found->drops.tell(verdict);
   const std::string doubt = tell_doubts(*recording, *field, verdict);
   if (verdict.grade != Grade::fail) {
@@ -214,10 +203,11 @@ void run(const CLI::App& command, const CalibrateLatencyOptions& options, Comman
   finish_calibration(options.paths, out_text(found->latency), std::move(json),
                      latency_page(found->latency, verdict, found->names, found->advice), verdict, status,
                      {made_from(options),
-                      [&found](auto& record, const auto& provenance) {
+                      [&found, &options](auto& record, const auto& provenance) {
                         const Latency& l = found->latency;
-                        record.latency = calibration::LatencyEntry{provenance, l.offset_ms, l.offset_ci95_ms[0],
-                                                                   l.offset_ci95_ms[1], l.drift_ppm};
+                        record.latency =
+                            calibration::LatencyEntry{provenance,          l.offset_ms, l.offset_ci95_ms[0],
+                                                      l.offset_ci95_ms[1], l.drift_ppm, options.delay_ms};
                       },
                       doubt});
 }
@@ -237,7 +227,10 @@ void add_calibrate_latency(CLI::App& calibrate, CommandStatus& status) {
                   "an appliance recording (.berec) or a session recording (a folder), played again")
       ->type_name("FILE");
   command.add_option("--bird", options->source.bird, "the bird on the scope, by its name (default scope)");
-  command.add_option("--delay-ms", options->delay_ms, "what [camera] delay_ms is now, to be told what to set")
+  command
+      .add_option("--delay-ms", options->delay_ms,
+                  "what [camera] delay_ms is now, to be told what to set; with --record it is kept, and birdseyed does "
+                  "not use the record with another")
       ->check(CLI::Range(0.0, 1000.0));
   command.add_option("--poses", options->poses, "poses with times, in place of an appliance: of the tracker")
       ->type_name("FILE");

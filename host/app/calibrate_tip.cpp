@@ -98,8 +98,7 @@ void print(const TipFound& found, const TipInput& input) {
   for (const std::string& note : input.set.notes) print_line(note);
   if (found.pivot) {
     const Pivot& p = *found.pivot;
-    fmt::print("tip in the sensor's frame {} mm, standard error {:.3f} mm\n", xyz_text(p.robust.tip_in_sensor_mm, 3),
-               p.tip_sigma_mm);
+    fmt::print("tip in the sensor's frame {} mm, {}\n", xyz_text(p.robust.tip_in_sensor_mm, 3), tip_sigma_text(p));
     if (!p.outliers.empty()) {
       std::vector<std::string> names;
       for (const std::size_t i : p.outliers) names.push_back(input.set.poses[i].name);

@@ -228,9 +228,12 @@ Result<ExitCode> demo(const DemoOptions& options) {
   if (!places) return places.error();
   if (auto written = write_pictures(out, session, *places); !written) return written.error();
   const Setup& setup = *session.setup;
-  if (auto written = write_files({{out / "tracker_from_patient.txt", pose_text(setup.tracker_from_patient().matrix())},
-                                  {out / "camera_from_sensor.txt", pose_text(setup.camera_from_sensor().matrix())},
-                                  {out / "camera.yaml", camera_text(setup.camera())}});
+  const auto& lens_covariance = session.scope()->camera_covariance();
+  if (auto written =
+          write_files({{out / "tracker_from_patient.txt", pose_text(setup.tracker_from_patient().matrix())},
+                       {out / "camera_from_sensor.txt", pose_text(setup.camera_from_sensor().matrix())},
+                       {out / "camera.yaml", camera_text(setup.camera()) +
+                                                 (lens_covariance ? camera_covariance_text(*lens_covariance) : "")}});
       !written) {
     return written.error();
   }

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "calibration/base/median.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/hand_eye/pose_streams.hpp"
 #include "host/calibrate/hand_eye_pictures.hpp"
 #include "host/calibrate/station_poses.hpp"
@@ -56,20 +58,46 @@ void tell_by_kind(const std::string& of_what, const std::vector<std::string>& re
   for (const std::string& line : by_kind(rejected)) notes.push_back(of_what + line);
 }
 
-/// Whether the world's origin is what a camera looks at: ahead of nearly all of the eyes, by less than 60 degrees.
-bool look_at_origin(const std::vector<HandEyeStation>& stations) {
+/// Whether a point of the world lies ahead (+1) or behind (-1) nearly all of the eyes, by less than 60 degrees.
+bool nearly_all_have(const Eigen::Vector3d& point_mm, double side, const std::vector<HandEyeStation>& stations) {
   constexpr double kCosine = 0.5, kNearlyAll = 0.9;
-  const auto ahead = std::ranges::count_if(stations, [](const HandEyeStation& s) {
-    const Eigen::Vector3d& origin = s.camera_from_marker->translation();
-    return origin.z() > kCosine * origin.norm();
+  const auto count = std::ranges::count_if(stations, [&](const HandEyeStation& s) {
+    const Eigen::Vector3d seen = *s.camera_from_marker * point_mm;
+    return side * seen.z() > kCosine * seen.norm();
   });
-  return static_cast<double>(ahead) >= kNearlyAll * static_cast<double>(stations.size());
+  return static_cast<double>(count) >= kNearlyAll * static_cast<double>(stations.size());
+}
+
+/// Whether eyes look away from what they seem to look at: their axes meet at a place that nearly all have behind them,
+/// as they have the world's origin. How far it is from them. Where only one of the two is so, what is tracked may be no
+/// camera.
+std::optional<double> look_away_mm(const std::vector<HandEyeStation>& stations) {
+  constexpr double kHardlyMeet = 0.01;  // the axes' directions differ by some six degrees
+  if (!nearly_all_have(Eigen::Vector3d::Zero(), -1, stations)) return std::nullopt;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const HandEyeStation& s : stations) {
+    const auto marker_from_camera = s.camera_from_marker->inverse();
+    const Eigen::Vector3d axis = marker_from_camera.rotation().col(2);
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis * axis.transpose();
+    normal += across;
+    right += across * marker_from_camera.translation();
+  }
+  const auto count = static_cast<double>(stations.size());
+  if (!(symmetric_eigenvalues(Eigen::Matrix3d(normal / count))[0] > kHardlyMeet)) return std::nullopt;
+  const Eigen::Vector3d meet_mm = solve_symmetric(normal, right);
+  if (!nearly_all_have(meet_mm, -1, stations)) return std::nullopt;
+  std::vector<double> behind_mm;
+  for (const HandEyeStation& s : stations) behind_mm.push_back((*s.camera_from_marker * meet_mm).norm());
+  return median_of(std::move(behind_mm));
 }
 
 /// Moves the board's origin to where hand-eye is to be judged.
 void judge_at(const std::optional<Eigen::Vector3d>& asked_mm, HandEyeRecording& out) {
   auto& stations = out.input.stations;
-  if (stations.empty() || (!asked_mm && look_at_origin(stations))) return;
+  if (stations.empty()) return;
+  if (!asked_mm) out.look_away_mm = look_away_mm(stations);
+  if (!asked_mm && nearly_all_have(Eigen::Vector3d::Zero(), 1, stations)) return;
   Eigen::Vector3d middle_mm = Eigen::Vector3d::Zero();
   for (const HandEyeStation& s : stations)
     middle_mm += s.camera_from_marker->inverse().translation() / static_cast<double>(stations.size());

@@ -43,8 +43,9 @@ struct HandEyeRecording {
   double stream_correlation = 0;  ///< 0 if there are no two streams
   /// Where in eye_poses' world the solver's Marker frame has its origin: what hand-eye is good for is judged there.
   Eigen::Vector3d judged_at_mm = Eigen::Vector3d::Zero();
-  bool directions_said = false;                        ///< somebody said of both streams of poses which way they go
-  bool sensor_inverted = false, eye_inverted = false;  ///< the streams' poses were inverted as they were read
+  /// Where the cameras look straight away from where their axes meet: how far that is behind them.
+  std::optional<double> look_away_mm;
+  bool directions_said = false;  ///< somebody said of both streams of poses which way they go
 };
 
 /// Reads pictures and poses and pairs them in the order of their names, numbers in them by value. There must be as many

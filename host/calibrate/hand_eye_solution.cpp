@@ -22,10 +22,11 @@ Result<void> solve_rod(const RodAngles& angles, HandEyeRecording& recording, Han
   return {};
 }
 
+constexpr double kLongest_mm = 500;  // of a laparoscope, from the sensor on its handle to the lens
+
 /// Where both streams are inverted they fit as well as the right ones: what is found then is where the tracker lies in
 /// the board's frame. What tells them apart is that a camera is near its sensor, and a tracker farther from the board.
 void judge_directions(const HandEyeRecording& recording, const calibration::HandEyeResult& result, Verdict& verdict) {
-  constexpr double kLongest_mm = 500;  // of a laparoscope, from the sensor on its handle to the lens
   if (!result.solved || recording.directions_said || recording.input.stations.front().tracker_from_body) return;
   const double hand_eye_mm = result.camera_from_sensor.translation().norm();
   const double inverted_mm = (result.body_from_marker * Eigen::Vector3d(-recording.judged_at_mm)).norm();
@@ -38,10 +39,24 @@ void judge_directions(const HandEyeRecording& recording, const calibration::Hand
       fmt::format("if the camera is {:.0f} mm from its sensor, say the other way of both: --poses-are {} "
                   "--eye-poses-are {}; if it is {:.0f} mm, say both as they were read: --poses-are {} "
                   "--eye-poses-are {}",
-                  inverted_mm, recording.sensor_inverted ? "tracker_from_sensor" : "sensor_from_tracker",
-                  recording.eye_inverted ? "marker_from_camera" : "camera_from_marker", hand_eye_mm,
-                  recording.sensor_inverted ? "sensor_from_tracker" : "tracker_from_sensor",
-                  recording.eye_inverted ? "camera_from_marker" : "marker_from_camera"));
+                  inverted_mm, recording.input.sensor_inverted ? "tracker_from_sensor" : "sensor_from_tracker",
+                  recording.input.eye_inverted ? "marker_from_camera" : "camera_from_marker", hand_eye_mm,
+                  recording.input.sensor_inverted ? "sensor_from_tracker" : "tracker_from_sensor",
+                  recording.input.eye_inverted ? "camera_from_marker" : "marker_from_camera"));
+}
+
+/// A scope that turns in a trocar has all its axes meet there too, behind the camera; no scope is as long as to have
+/// the trocar so far behind.
+void judge_look_away(double behind_mm, Verdict& verdict) {
+  const bool far = behind_mm > kLongest_mm;
+  verdict.add(far ? Grade::fail : Grade::marginal,
+              fmt::format("nearly all poses of the camera look straight away from where their axes meet, {:.0f} mm "
+                          "behind them: OpenGL's axes, or left-handed{}?",
+                          behind_mm, far ? "" : ", or does the scope turn in a trocar there"),
+              fmt::format("export poses of a camera that looks along its z axis, x to the right and y down (from "
+                          "OpenGL, turn it by 180 degrees about x), in right-handed axes; if they are right{}, or are "
+                          "no camera's, say where to judge: --at X,Y,Z",
+                          far ? "" : ", of a scope in a trocar"));
 }
 
 }  // namespace
@@ -50,7 +65,8 @@ Result<HandEyeFound> solve_hand_eye(HandEyeRecording& recording, const RodAngles
   HandEyeFound out;
   if (recording.input.stations.empty() || (!by_eye_poses && !recording.input.camera)) {
     out.verdict = recording.camera_verdict;
-    if (out.verdict.grade != Grade::fail)
+    // Where no lens was found for want of pictures of the board, that is what to see to.
+    if (out.verdict.grade != Grade::fail || recording.input.stations.empty())
       out.verdict.add(Grade::fail, "no picture shows the board together with a pose",
                       "see that --board names the pattern in the pictures");
     return out;
@@ -64,6 +80,7 @@ Result<HandEyeFound> solve_hand_eye(HandEyeRecording& recording, const RodAngles
     out.verdict = calibration::judge(out.result);
   }
   if (by_eye_poses) judge_directions(recording, out.result, out.verdict);
+  if (recording.look_away_mm) judge_look_away(*recording.look_away_mm, out.verdict);
   if (const Grade lens = recording.camera_verdict.grade; lens != Grade::pass) {
     out.verdict.add(lens, fmt::format("the lens, calibrated from the same pictures, is {} by itself", name_of(lens)),
                     "calibrate the lens from more pictures (birdseye calibrate camera) and give it as --camera");

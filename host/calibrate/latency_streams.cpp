@@ -44,8 +44,11 @@ class Gatherer {
     }
   }
   void take(const wire::VideoFrame& frame) {
-    // What the appliance takes off by an earlier record is part of what is looked for.
+    // What the appliance takes off by an earlier record is part of what is looked for, and kept: whoever sets delay_ms
+    // too has it taken off twice, which the times before that do not show.
     const DeviceTime acquired = frame.info.acquired + frame.info.latency.value_or(Duration{0});
+    streams_.in_force_ms.reset();
+    if (frame.info.latency) streams_.in_force_ms = 1e3 * frame.info.latency->seconds();
     begin(acquired);
     ++streams_.frames;
     const std::vector<std::uint8_t> grey = grey_of({*frame.rgb, frame.width_px, frame.height_px});
@@ -111,14 +114,16 @@ std::string last_line(const std::filesystem::path& log) {
   return last;
 }
 
-Result<LatencyStreams> gather(EventSource& stream, const LatencySource& source, Progress& progress) {
+}  // namespace
+
+Result<LatencyStreams> gather_events(EventSource& events, const LatencySource& source, Progress& progress) {
   Gatherer gatherer(source);
   HostTime heard = host_now();
   // Streams that come but tell nothing of this bird, or show no motion, do not last: finish() says why.
   const HostTime latest = heard + kPatience + Duration::from_seconds(std::max(0.0, source.seconds));
   while (source.seconds <= 0 || (gatherer.lasted_s() < source.seconds && host_now() < latest)) {
     if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
-    auto event = stream.next(Deadline::after(kLook));
+    auto event = events.next(Deadline::after(kLook));
     if (!event) {
       if (source.seconds <= 0 && event.error().code == Errc::disconnected) break;  // a recording has come to its end
       return event.error();
@@ -142,10 +147,8 @@ Result<LatencyStreams> gather(EventSource& stream, const LatencySource& source, 
   return gatherer.finish();
 }
 
-}  // namespace
-
 Result<LatencyStreams> gather_streams(EventStream& stream, const LatencySource& source, Progress& progress) {
-  auto streams = gather(stream, source, progress);
+  auto streams = gather_events(stream, source, progress);
   const Drops drops = stream.drops();
   if (const std::string words = drops.words(); !words.empty()) progress.keep(words);
   if (streams) streams->drops = drops;
@@ -171,7 +174,7 @@ Result<LatencyStreams> session_streams(const std::filesystem::path& recording, c
   note_interrupts();
   const auto reader = RecordingReader::open(recording, {.events_sha256 = events_sha256});
   if (!reader) return reader.error();
-  return gather(**reader, source, progress);
+  return gather_events(**reader, source, progress);
 }
 
 Result<LatencyStreams> replay_streams(const std::filesystem::path& recording, const LatencySource& source,

@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calibration/base/result.hpp"
 #include "calibration/latency/latency.hpp"
 #include "drivers/system/progress.hpp"
+#include "host/link/event_source.hpp"
 #include "host/link/event_stream.hpp"
 
 namespace birdseye::host {
@@ -19,6 +21,9 @@ struct LatencyStreams {
   std::size_t frames = 0, frames_without_motion = 0;
   std::string usual_reason;  ///< why the latest frame without motion had none
   std::string bird;          ///< whose poses these are
+  /// What the appliance takes off the frames' times by its calibration record, at the latest frame. The motion above is
+  /// by the times before that.
+  std::optional<double> in_force_ms;
   Drops drops;
 };
 
@@ -28,6 +33,8 @@ struct LatencySource {
 };
 
 /// Takes the stream's events for source.seconds. Errors: the stream gives no poses of the bird, or no frames.
+Result<LatencyStreams> gather_events(EventSource& events, const LatencySource& source, Progress& progress);
+/// Likewise, and says what this machine could not take in time.
 Result<LatencyStreams> gather_streams(EventStream& stream, const LatencySource& source, Progress& progress);
 /// From an appliance that runs, HOST:PORT.
 Result<LatencyStreams> record_streams(const std::string& server, const LatencySource& source, Progress& progress);

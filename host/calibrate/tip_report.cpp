@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "host/calibrate/tip_pictures.hpp"
@@ -51,11 +52,14 @@ void add_pivot(const Pivot& pivot, const TipInput& input, nlohmann::json& out) {
   out.update(fit_json(pivot.robust));
   out["algebraic"] = fit_json(pivot.algebraic);
   out["outliers"] = names_of(pivot.outliers, input.set.poses);
-  nlohmann::json covariance = nlohmann::json::array();
-  for (int i = 0; i < 3; ++i) covariance.push_back(vector_json(Eigen::Vector3d(pivot.tip_covariance_mm2.row(i))));
-  out["sigma"] = {{"tip_mm", vector_json(Eigen::Vector3d(pivot.tip_covariance_mm2.diagonal().cwiseMax(0).cwiseSqrt()))},
-                  {"worst_mm", pivot.tip_sigma_mm},
-                  {"tip_covariance_mm2", covariance}};
+  if (std::isfinite(pivot.tip_sigma_mm)) {
+    nlohmann::json covariance = nlohmann::json::array();
+    for (int i = 0; i < 3; ++i) covariance.push_back(vector_json(Eigen::Vector3d(pivot.tip_covariance_mm2.row(i))));
+    out["sigma"] = {
+        {"tip_mm", vector_json(Eigen::Vector3d(pivot.tip_covariance_mm2.diagonal().cwiseMax(0).cwiseSqrt()))},
+        {"worst_mm", pivot.tip_sigma_mm},
+        {"tip_covariance_mm2", covariance}};
+  }
   out["held_out_mm"] = pivot.held_out_mm;
   out["tilt_deg"] = pivot.tilt.widest_deg;
   out["weakest"] = {{"direction_in_sensor", vector_json(pivot.tilt.weakest_in_sensor)},
@@ -154,13 +158,18 @@ std::string tip_text(const TipFound& found) {
   if (!found.pivot) return {};
   const Eigen::Vector3d& tip = found.pivot->robust.tip_in_sensor_mm;
   std::string text = fmt::format(
-      "# a pointer's tip in the frame of its sensor, mm: x y z\n# verdict {}, standard error "
-      "{:.3f} mm, held-out error {:.3f} mm rms\n{:.17g} {:.17g} {:.17g}\n",
-      name_of(found.verdict.grade), found.pivot->tip_sigma_mm, found.pivot->held_out_mm, tip.x(), tip.y(), tip.z());
+      "# a pointer's tip in the frame of its sensor, mm: x y z\n# verdict {}, {}, held-out error {:.3f} mm "
+      "rms\n{:.17g} {:.17g} {:.17g}\n",
+      name_of(found.verdict.grade), tip_sigma_text(*found.pivot), found.pivot->held_out_mm, tip.x(), tip.y(), tip.z());
   if (!found.axis) return text;
   const Eigen::Vector3d& axis = found.axis->axis_in_sensor;
   return text + fmt::format("# its shaft, towards the tip: {:.17g} {:.17g} {:.17g} (standard error {:.3f} degrees)\n",
                             axis.x(), axis.y(), axis.z(), found.axis->sigma_deg);
+}
+
+std::string tip_sigma_text(const Pivot& pivot) {
+  return std::isfinite(pivot.tip_sigma_mm) ? fmt::format("standard error {:.3f} mm", pivot.tip_sigma_mm)
+                                           : "no standard error: the poses leave a direction open";
 }
 
 std::string xyz_text(const Eigen::Vector3d& v, int digits) {

@@ -12,6 +12,7 @@
 #include "host/files/write_files.hpp"
 #include "host/report/html_page.hpp"
 #include "host/report/line_plot.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -82,6 +83,11 @@ void add_deforming(HtmlPage& page, const DeformingFigures& d, const DemoFigures&
 
 void DemoFigures::note_hidden(const std::string& reason) {
   static const std::regex kNumber("[0-9]+([.][0-9]+)?");
+  // Frames before it had shown that at all are frames_unproven, and no part of these.
+  if (reason == words("why_video_untold")) {
+    ++hidden_because["the video, which had shown that it goes with the scope's poses, had to show it anew"];
+    return;
+  }
   ++hidden_because[std::regex_replace(reason, kNumber, "...")];
 }
 
@@ -142,7 +148,7 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
   row("tracker noise, each axis", fmt::format("{} mm, {} deg", f.position_noise_mm, f.angle_noise_deg));
   row("frames / dropped / without overlay",
       fmt::format("{} / {} / {}", f.frames, f.frames_dropped, f.frames_without_overlay));
-  row("frames before the video had shown that it goes with the poses", fmt::format("{}", f.frames_unproven));
+  row("frames before the video had first shown that it goes with the poses", fmt::format("{}", f.frames_unproven));
   row("frames of the board without poses / other messages dropped",
       fmt::format("{} / {}", f.board_frames_left_out, f.drops.others));
   row("wall time", fmt::format("{:.1f} s", f.wall_s));

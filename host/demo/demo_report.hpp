@@ -46,8 +46,8 @@ struct DemoFigures {
   double tracker_rate_hz = 0;
   int frames = 0;
   int frames_dropped = 0;
-  int frames_unproven = 0;         ///< before the video had shown that it goes with the poses
-  int frames_without_overlay = 0;  ///< once the video had shown that
+  int frames_unproven = 0;         ///< before the video had first shown that it goes with the poses
+  int frames_without_overlay = 0;  ///< since then
   std::map<std::string, int>
       hidden_because;  ///< how many of frames_without_overlay for which reason, without its figures
   Drops drops;         ///< frames among frames_dropped, and other messages

@@ -158,7 +158,7 @@ void DemoSession::begin_to_deform() {
   auto transfer = load_transfer_function("liver");
   if (!transfer) return;
   deformation_.begin(views_.views(), setup->camera(), patient_,
-                     std::make_shared<const TransferFunction>(*std::move(transfer)));
+                     std::make_shared<const TransferFunction>(*std::move(transfer)), {}, scope_->camera_covariance());
 }
 
 void DemoSession::note_deformed() {

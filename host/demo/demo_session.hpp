@@ -67,6 +67,9 @@ class DemoSession {
   /// What the overlay shows deformed; null where it shows the CT as it was taken.
   [[nodiscard]] const DeformedOrgan* deformed() const { return deformation_.found().get(); }
 
+  /// As the board gave it; empty before that.
+  [[nodiscard]] const std::optional<ScopeSetup>& scope() const { return scope_; }
+
   DemoFigures figures;
   std::vector<OverlaidFrame> overlaid;
   std::vector<KeptFrame> kept;

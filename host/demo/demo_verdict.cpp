@@ -54,7 +54,7 @@ Verdict demo_verdict(const DemoFigures& figures) {
   }
   limits.push_back(
       {unproven_percent, 60, 80,
-       fmt::format("{:.1f} % of the frames had to go by before the video had shown that it goes with the poses",
+       fmt::format("{:.1f} % of the frames had to go by before the video had first shown that it goes with the poses",
                    unproven_percent),
        "%"});
   limits.push_back(

@@ -30,15 +30,33 @@ ApplianceTold listen_to(wire::Client& client) {
   return told;
 }
 
-Check status_check(const wire::Status& status) {
+/// The remedy that birdseyed names for a record that knows no instruments, for this appliance.
+std::string bind_command(const std::string& address) {
+  return fmt::format("birdseye calibrate record FILE --bind {}", address);
+}
+bool is_unbound(const std::string& why_not) {
+  return why_not.find("calibrate record FILE --bind") != std::string::npos;
+}
+
+Check status_check(const wire::Status& status, const std::string& address) {
   Check check{kAppliance, "status", CheckState::good, status.text.empty() ? "all is well" : status.text, ""};
   const bool rests_on_unsigned = status.text.find("UNSIGNED") != std::string::npos;
   if (status.ok && !rests_on_unsigned) return check;
   check.state = status.ok ? CheckState::could_be_better : CheckState::bad;
   // Who signed a record or a map is no matter of the instruments.
   const bool of_signatures = rests_on_unsigned || status.text.find("accept_unsigned") != std::string::npos;
-  check.remedy = of_signatures ? "docs/manual/signatures.md says how to have it signed; see the instruments below, too"
-                               : "see the instruments below";
+  if (is_unbound(status.text)) {
+    // Where something else is wrong too, birdseyed names it first.
+    check.remedy = bind_command(address);
+    if (status.text.find("; calibration of scope") != std::string::npos)
+      check.remedy += "; see the instruments below, too";
+  } else if (of_signatures) {
+    check.remedy = "docs/manual/signatures.md says how to have it signed; see the instruments below, too";
+  } else if (status.text.starts_with("calibration")) {
+    check.remedy = "see the calibration record below";
+  } else {
+    check.remedy = "see the instruments below";
+  }
   return check;
 }
 
@@ -86,12 +104,21 @@ Check clock_check(const wire::WallClock& clock) {
   return check;
 }
 
-Check calibration_check(const wire::Calibration& calibration) {
+Check calibration_check(const wire::Calibration& calibration, const std::string& address) {
   Check check{kAppliance, "calibration record", CheckState::good, "", ""};
   if (!calibration.in_force) {
     check.state = CheckState::missing;  // the window can calibrate
     check.found = calibration.why_not.empty() ? "none is in force" : calibration.why_not;
-    check.remedy = "name the scope's record in [calibration] record, or calibrate: docs/manual/calibration.md";
+    if (is_unbound(check.found)) {
+      check.remedy = bind_command(address);
+    } else if (check.found.find("the record's latency was measured with") != std::string::npos) {
+      check.remedy = fmt::format(
+          "set [camera] delay_ms back, or birdseye calibrate latency --server {} --record FILE: "
+          "docs/manual/calibrate-latency.md",
+          address);
+    } else {
+      check.remedy = "name the scope's record in [calibration] record, or calibrate: docs/manual/calibration.md";
+    }
     return check;
   }
   const auto record = calibration::parse_record(calibration.record);
@@ -137,7 +164,7 @@ std::vector<Check> appliance_checks(const std::string& address, const ApplianceT
         "on "
         "that network";
   }
-  if (told.status) checks.push_back(status_check(*told.status));
+  if (told.status) checks.push_back(status_check(*told.status, address));
   if (told.health) {
     for (const wire::InstrumentHealth& instrument : told.health->instruments)
       checks.push_back(instrument_check(instrument));
@@ -151,7 +178,7 @@ std::vector<Check> appliance_checks(const std::string& address, const ApplianceT
     checks.front().remedy = "another program may listen there: see the port";
   }
   if (told.calibration) {
-    checks.push_back(calibration_check(*told.calibration));
+    checks.push_back(calibration_check(*told.calibration, address));
   } else if (told.health) {
     checks.push_back(
         {kAppliance, "calibration record", CheckState::missing, "it names none",

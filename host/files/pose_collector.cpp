@@ -24,13 +24,19 @@ namespace {
 constexpr double kRotationTolerance = 1e-3;
 
 /// What is wrong with a position, if anything.
-std::string problem_of(const Eigen::Vector3d& position_mm) {
+std::string problem_of(const Eigen::Vector3d& position_mm, double mm_per_unit) {
   if (!position_mm.allFinite()) return "not finite";
   // No tracker sees so far; what is beyond stands for "not seen", as NDI's -3.697314E28 does.
   const double farthest_mm = position_mm.cwiseAbs().maxCoeff();
   if (farthest_mm <= kFarthestMm) return {};
   Eigen::Index which = 0;
   position_mm.cwiseAbs().maxCoeff(&which);
+  if (farthest_mm <= kFarthestMm * mm_per_unit) {
+    return fmt::format(
+        "{:.6g} mm is no position; {:.6g} mm is one: the unit of lengths (--unit, or of the header) is "
+        "likely not the file's",
+        position_mm[which], position_mm[which] / mm_per_unit);
+  }
   return fmt::format("{:.6g} mm is no position (a stand-in for a missing one)", position_mm[which]);
 }
 
@@ -69,7 +75,7 @@ ReadPose checked_pose(const Eigen::Matrix4d& matrix, double mm_per_unit) {
   }
   const Eigen::Matrix3d r = matrix.topLeftCorner<3, 3>();
   const Eigen::Vector3d position_mm = mm_per_unit * matrix.topRightCorner<3, 1>();
-  out.problem = problem_of(position_mm);
+  out.problem = problem_of(position_mm, mm_per_unit);
   if (!out.problem.empty()) return out;
   const double off = (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(off <= 2 * kRotationTolerance)) {
@@ -88,7 +94,7 @@ ReadPose checked_pose(const Eigen::Matrix4d& matrix, double mm_per_unit) {
 ReadPose checked_pose(const Eigen::Quaterniond& quaternion, const Eigen::Vector3d& position, double mm_per_unit) {
   ReadPose out;
   const Eigen::Vector3d position_mm = mm_per_unit * position;
-  out.problem = quaternion.coeffs().allFinite() ? problem_of(position_mm) : "not finite";
+  out.problem = quaternion.coeffs().allFinite() ? problem_of(position_mm, mm_per_unit) : "not finite";
   if (!out.problem.empty()) return out;
   if (std::abs(quaternion.norm() - 1) > kRotationTolerance) {
     out.problem = fmt::format("its quaternion has length {:.4g} where a rotation has 1", quaternion.norm());

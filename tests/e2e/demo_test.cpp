@@ -43,6 +43,9 @@ TEST(Demo, PutsTheTumourWhereItHasMovedDespiteTheTrackersNoise) {
   EXPECT_NE(report.value("verdict", "fail"), "fail");
   EXPECT_LT(report.value("frames_without_overlay", 1000), 10);
   EXPECT_GT(std::filesystem::file_size(scratch / "demo/rigid_and_deformed.png"), 2000U);
+  std::ifstream lens(scratch / "demo/camera.yaml");
+  const std::string text{std::istreambuf_iterator<char>(lens), {}};
+  EXPECT_NE(text.find("camera_covariance"), std::string::npos) << "how well the lens is known was found, and is lost";
 }
 
 TEST(Demo, IsLimitedByTheRecordsStepsWithoutNoiseAndWithoutDeformation) {

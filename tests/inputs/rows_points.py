@@ -168,9 +168,9 @@ def plate(folder, bend_mm=0.0, days=9, swap=False, metres=False):
     (folder / "today.csv").write_text(touched(bend_mm))
 
 
-CHECK = ("for day in day?.csv; do birdseye calibrate field check --plate plate.csv --measured $day --history history.csv --when $day >/dev/null "
-         "2>&1; done; birdseye calibrate field check --plate plate.csv --measured today.csv --history history.csv --when today --json check.json")
-CHECK_ONE = "birdseye calibrate field check --plate plate.csv --measured today.csv --history history.csv --when today"
+CHECK = ("for day in day?.csv; do birdseye calibrate field check --plate plate.csv --measured $day --history history.csv --when "
+         "2026-11-2$(echo $day | tr -dc 0-9) >/dev/null 2>&1; done; birdseye calibrate field check --plate plate.csv --measured today.csv --history history.csv --when 2026-11-29 --json check.json")
+CHECK_ONE = "birdseye calibrate field check --plate plate.csv --measured today.csv --history history.csv --when 2026-11-29"
 
 
 def damaged_history(folder):

@@ -112,6 +112,26 @@ TEST(CameraVerdict, ParallelBoardsLeaveTheFocalLengthOpenAndFail) {
   }
 }
 
+TEST(CameraVerdict, ALensThatIsRefocusedHalfWayIsNamed) {
+  const BoardScene scene;
+  CameraModel refocused = hd_lens();
+  refocused.fx_px *= 1.03;
+  refocused.fy_px *= 1.03;
+  for (const unsigned seed : {11U, 12U}) {
+    Views views = scene.views(hd_lens(), 12, seed);
+    const Views others = scene.views(refocused, 12, seed + 100);
+    views.insert(views.end(), others.begin(), others.end());
+    const auto found = calibrate_camera(views, 1920, 1080);
+    ASSERT_TRUE(found);
+    EXPECT_EQ(judge_camera(*found).grade, Grade::marginal) << all_of(judge_camera(*found));
+    EXPECT_TRUE(says(judge_camera(*found), "refocused or zoomed between views")) << all_of(judge_camera(*found));
+
+    const auto sound = calibrate_camera(scene.views(hd_lens(), 24, seed), 1920, 1080);
+    ASSERT_TRUE(sound && sound->focal_halves);
+    EXPECT_EQ(judge_camera(*sound).grade, Grade::pass) << all_of(judge_camera(*sound));
+  }
+}
+
 TEST(CameraVerdict, TheSamePoseAgainAndAgainIsOneView) {
   const BoardScene scene;
   Views views = scene.views(hd_lens(), 2, 2);

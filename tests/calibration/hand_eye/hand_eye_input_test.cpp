@@ -43,7 +43,12 @@ TEST(HandEyeInput, TooFewStations) {
   EXPECT_EQ(calibrate_hand_eye(bench.input).error().code, Errc::bad_value);
   HandEyeBench four(kGood);
   four.input.stations.resize(4);
-  expect_fail(four.input, "4 stations used, of 5", "take 6 more");
+  expect_fail(four.input, "4 stations used; at least 5 are needed (10 for a pass)", "take 6 more");
+  HandEyeBench nine(kGood);
+  nine.input.stations.resize(9);
+  const auto fewer = calibrate_hand_eye(nine.input);
+  ASSERT_TRUE(fewer);
+  EXPECT_THAT(judge(*fewer).reasons, Contains(HasSubstr("stations used; 10 are needed for a pass")));
 }
 
 TEST(HandEyeInput, TurnsAboutOneAxisAreNamedWithTheAxis) {
@@ -112,7 +117,20 @@ TEST(HandEyeInput, InvertedPoses) {
     const auto inverse = s.tracker_from_sensor.inverse();
     s.tracker_from_sensor = {inverse.rotation(), inverse.translation()};
   }
-  expect_fail(bench.input, "seem to be inverted", "--poses-are sensor_from_tracker");
+  expect_fail(bench.input, "seem to be inverted", "say so: --poses-are sensor_from_tracker");
+  // Right files, of which it was said all the same.
+  bench.input.sensor_inverted = true;
+  expect_fail(bench.input, "seem to be inverted", "leave --poses-are out");
+  HandEyeScene scene = kGood;
+  scene.poses_only = true;
+  HandEyeBench eye(scene);
+  for (HandEyeStation& s : eye.input.stations) {
+    const auto inverse = s.camera_from_marker->inverse();
+    s.camera_from_marker = Transform<Camera, Marker>(inverse.rotation(), inverse.translation());
+  }
+  expect_fail(eye.input, "seem to be inverted", "say --eye-poses-are camera_from_marker");
+  eye.input.eye_inverted = true;
+  expect_fail(eye.input, "seem to be inverted", "leave --eye-poses-are out; of the tracker's, say --poses-are");
 }
 
 TEST(HandEyeInput, PosesOfALeftHandedFrame) {
@@ -293,6 +311,64 @@ TEST(HandEyeInput, WhatCannotBeUsedIsAnError) {
   input = bench.input;
   input.stations[1].right_view = input.stations[1].view;
   refused(input, "no second lens");
+}
+
+/// From station `from` on the sensor sits elsewhere on the scope, or the board elsewhere.
+void slide(HandEyeInput& input, std::size_t from, const Eigen::Vector3d& sensor_mm, const Eigen::Vector3d& board_mm) {
+  for (std::size_t i = from; i < input.stations.size(); ++i) {
+    const auto& was = input.stations[i].tracker_from_sensor;
+    input.stations[i].tracker_from_sensor = {
+        was.rotation(), Eigen::Vector3d(was.translation() + was.rotation() * sensor_mm + board_mm)};
+  }
+}
+
+TEST(HandEyeInput, ASensorThatSlidOrABoardThatMovedHalfWay) {
+  const HandEyeScene scene{.stations = 20, .corner_px = 0.15, .position_mm = 0.5, .angle_deg = 0.1};
+  HandEyeBench slid(scene);
+  slide(slid.input, 10, {3, 0, 0}, {0, 0, 0});
+  expect_fail(slid.input, "slid on the scope, or the board moved, between station 9 and station 10",
+              "fix the sensor to the scope");
+  HandEyeBench moved(scene);
+  slide(moved.input, 10, {0, 0, 0}, {0, 3, 0});
+  expect_fail(moved.input, "slid on the scope, or the board moved, between station ", "the board to its place");
+}
+
+TEST(HandEyeInput, ASlideIsGradedByWhatItIsAtLeast) {
+  auto result = calibrate_hand_eye(HandEyeBench(kGood).input);
+  ASSERT_TRUE(result && result->solved);
+  result->step = HandEyeStep{"a", "b", 6, 2.9, 0, 0, 9, 6};
+  EXPECT_THAT(judge(*result).reasons, ::testing::Not(Contains(HasSubstr("slid on the scope"))));
+  result->step->shift_sigma_mm = 2.2;
+  EXPECT_EQ(judge(*result).grade, Grade::marginal);
+  EXPECT_THAT(judge(*result).reasons, Contains(HasSubstr("6.0 mm at the board (at least 1.6)")));
+  result->step->shift_sigma_mm = 1;
+  EXPECT_EQ(judge(*result).grade, Grade::fail);
+}
+
+/// Of stations that tell one direction badly a slide is not told larger than it is.
+TEST(HandEyeInput, ASlightSlideIsNoFail) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    HandEyeBench bench({.stations = 12, .position_mm = 0.05, .angle_deg = 0.02, .poses_only = true, .seed = seed});
+    slide(bench.input, 8, {0.3, 0, 0}, {0, 0, 0});
+    const auto result = calibrate_hand_eye(bench.input);
+    ASSERT_TRUE(result && result->solved) << seed;
+    const double least_mm = result->step ? result->step->least_shift_mm() : 0;
+    EXPECT_LT(least_mm, 0.6) << seed;
+  }
+}
+
+/// Sound calibrations, of which chance is to be taken for a slide in one of a thousand.
+TEST(HandEyeInput, ChanceIsNoSlide) {
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    const auto result = calibrate_hand_eye(HandEyeBench({.stations = seed % 2 == 0 ? 12 : 20,
+                                                         .position_mm = 0.8,
+                                                         .angle_deg = 0.2,
+                                                         .poses_only = true,
+                                                         .seed = seed})
+                                               .input);
+    ASSERT_TRUE(result && result->solved) << seed;
+    EXPECT_FALSE(result->step) << seed << ": " << result->step->sigmas << " sigmas";
+  }
 }
 
 }  // namespace

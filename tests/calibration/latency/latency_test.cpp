@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <numbers>
+#include <random>
 #include <sstream>
 
 #include "tests/support/data.hpp"
@@ -164,7 +166,81 @@ TEST(Latency, WhatDeterminesNothingFailsWithTheReason) {
   // Further away than is sought.
   camera = camera_of(4, 25);
   camera.offset_ms = 1500;
-  expect_fail(record(hand, tracker_of(4)), record(hand, camera), {});
+  expect_fail(record(hand, tracker_of(4)), record(hand, camera),
+              {"a lag of 1500 ms (correlation ", "beyond the 1000 ms either way", "stamped by one clock"});
+  const auto filmed =
+      find_latency(simulated::record_poses(hand, tracker_of(4), 1.8), simulated::film(hand, camera, 0.2));
+  ASSERT_TRUE(filmed) << filmed.error().what;
+  const std::string why = reasons_of(latency_verdict(*filmed, "tracker", "video"));
+  EXPECT_NE(why.find("a lag of 1500 ms (correlation "), std::string::npos) << why;
+}
+
+/// Nearly even: each axis has two paces that are alike, so that the motion resembles itself a swing later.
+Eigen::Quaterniond nearly_even(unsigned seed, double t) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> hz(0.45, 0.6), phase(0, 2 * std::numbers::pi), size(0.05, 0.2);
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();
+  for (int wave = 0; wave < 2; ++wave) {
+    for (int axis = 0; axis < 3; ++axis)
+      v[axis] += size(random) * std::sin(2 * std::numbers::pi * hz(random) * t + phase(random));
+  }
+  return Eigen::Quaterniond(rotation_exp(v));
+}
+
+TEST(Latency, WhereTheTrueLagIsBeyondWhatIsSoughtNoOtherIsTheAnswer) {
+  int named = 0, answered = 0;
+  constexpr unsigned kMotions = 12;
+  for (unsigned seed = 1; seed <= kMotions; ++seed) {
+    const auto motion = [seed](double t) { return nearly_even(seed, t); };
+    StreamSettings tracker = tracker_of(seed), camera = camera_of(seed, 25);
+    tracker.noise_deg = 0.1;
+    camera.noise_deg = 0.05;
+    for (const double lag_ms : {1700.0, -1300.0}) {
+      camera.offset_ms = lag_ms;
+      const auto found = find_latency(record(motion, tracker), record(motion, camera));
+      ASSERT_TRUE(found) << found.error().what;
+      const Verdict verdict = latency_verdict(*found, "tracker", "video");
+      EXPECT_EQ(verdict.grade, Grade::fail) << "motion " << seed << ": " << found->offset_ms << " for " << lag_ms;
+      if (std::abs(1e3 * found->far_lag_s - lag_ms) <= 10 &&
+          reasons_of(verdict).find("beyond the 1000 ms either way") != std::string::npos)
+        ++named;
+    }
+    camera.offset_ms = 83;
+    const auto within = find_latency(record(motion, tracker), record(motion, camera));
+    ASSERT_TRUE(within) << within.error().what;
+    const Verdict verdict = latency_verdict(*within, "tracker", "video");
+    if (verdict.grade == Grade::fail) continue;
+    ++answered;
+    EXPECT_NEAR(within->offset_ms, 83, 2) << seed;
+  }
+  EXPECT_EQ(named, 2 * static_cast<int>(kMotions));
+  EXPECT_GE(answered, static_cast<int>(kMotions) - 2);
+}
+
+TEST(Latency, AFarLagThatCouldNotBeComparedIsNoTie) {
+  Latency latency;
+  latency.overlap_s = 20;
+  latency.correlation = 0.97;
+  latency.determined = true;
+  latency.sought_s = 1;
+  latency.offset_ci95_ms = {-1, 1};
+  latency.a.turn_speed_deg_s = latency.b.turn_speed_deg_s = 20;
+  ASSERT_EQ(latency_verdict(latency, "tracker", "video").grade, Grade::pass);
+  latency.far_lag_s = 2.5;
+  latency.far_correlation = 0.96;
+  const Verdict open = latency_verdict(latency, "tracker", "video");
+  EXPECT_EQ(open.grade, Grade::marginal) << reasons_of(open);
+  EXPECT_NE(reasons_of(open).find("cannot be told"), std::string::npos) << reasons_of(open);
+  latency.far_sigmas = 1;
+  EXPECT_EQ(latency_verdict(latency, "tracker", "video").grade, Grade::fail) << "a tie";
+  latency.far_sigmas = 6;
+  EXPECT_EQ(latency_verdict(latency, "tracker", "video").grade, Grade::pass);
+  // A correlation that is higher by 0.03 is no more than noise where the fits say otherwise.
+  latency.far_correlation = 1;
+  EXPECT_EQ(latency_verdict(latency, "tracker", "video").grade, Grade::pass);
+  latency.far_sigmas = -5;
+  EXPECT_NE(reasons_of(latency_verdict(latency, "tracker", "video")).find("agree best at a lag of 2500 ms"),
+            std::string::npos);
 }
 
 TEST(Latency, AnEvenSwingIsAmbiguousAndSaidToBe) {

@@ -67,6 +67,8 @@ TEST(PivotVerdict, EachFaultHasItsWords) {
                  Grade::marginal, "degrees, less than 40");
   expect_verdict(SimulatedPointer{.sideways_deg = 1, .position_noise_mm = 0.05}.poses(60), Grade::fail,
                  "turned about no more than one axis, (1.00, ");
+  expect_verdict(SimulatedPointer{.sideways_deg = 0, .position_noise_mm = 0.05}.poses(60), Grade::fail,
+                 "no standard error of the tip: along (1.00, ");
   expect_verdict(SimulatedPointer{.sideways_deg = 8, .position_noise_mm = 0.05}.poses(60), Grade::marginal,
                  "turned about little more than one axis");
   expect_verdict(SimulatedPointer{.position_noise_mm = 2}.poses(400), Grade::marginal,

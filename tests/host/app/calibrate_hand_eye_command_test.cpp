@@ -272,6 +272,53 @@ TEST(CalibrateHandEyeCommand, TwoTrackersAreJudgedWhereTheirPosesAre) {
   expect_refused("birdseye", command + " --at 1,2", {"--at"});
 }
 
+TEST(CalibrateHandEyeCommand, CamerasThatLookAwayFromTheBoardAreTold) {
+  const Scratch scratch;
+  const testing::HandEyeStream stream({.seconds = 30, .sensor_hz = 30, .camera_hz = 10, .bent_mm = 0});
+  const std::string head = "t,x,y,z,qx,qy,qz,qw\n";
+  std::string hand = head, opengl = head, hand_left = head, eye_left = head;
+  const Eigen::Matrix4d turned = Eigen::Vector4d(1, -1, -1, 1).asDiagonal();
+  const Eigen::Matrix4d mirror = Eigen::Vector4d(1, 1, -1, 1).asDiagonal();
+  for (const auto& s : stream.sensor) {
+    hand += row_of(s.time_s, s.tracker_from_sensor.matrix());
+    hand_left += row_of(s.time_s, mirror * s.tracker_from_sensor.matrix() * mirror);
+  }
+  for (const auto& s : stream.views) {
+    const Eigen::Matrix4d pose = s.camera_from_marker.inverse().matrix();
+    opengl += row_of(s.time_s, pose * turned);
+    eye_left += row_of(s.time_s, mirror * pose * mirror);
+  }
+  hand = " --poses " + scratch.file("hand.csv", hand) + " --eye-poses " + scratch.file("opengl.csv", opengl);
+  hand_left = " --poses " + scratch.file("left.csv", hand_left) + " --eye-poses " + scratch.file("eye.csv", eye_left);
+  for (const std::string& files : {hand, hand_left}) {
+    const auto done = run("birdseye", "calibrate hand-eye --json " + (scratch / "x.json").string() + files);
+    EXPECT_NE(read_json(scratch / "x.json")["verdict"], "pass") << done.output;
+    EXPECT_THAT(done.output, HasSubstr("OpenGL's axes, or left-handed"));
+  }
+}
+
+/// Its axes meet at the trocar, 110 mm behind the lens, and the world's origin is farther behind.
+TEST(CalibrateHandEyeCommand, AScopeThatTurnsInATrocarDoesNotFail) {
+  const Scratch scratch;
+  const testing::HandEyeStream stream({.seconds = 30, .sensor_hz = 30, .camera_hz = 10, .bent_mm = 0});
+  std::string hand = "t,x,y,z,qx,qy,qz,qw\n", eye = hand;
+  const Eigen::Matrix4d turned = Eigen::Vector4d(1, -1, -1, 1).asDiagonal();
+  for (const auto& s : stream.sensor) hand += row_of(s.time_s, s.tracker_from_sensor.matrix());
+  for (const auto& s : stream.views) {
+    Eigen::Matrix4d pose = s.camera_from_marker.inverse().matrix() * turned;
+    pose.topRightCorner<3, 1>() += Eigen::Vector3d(0, 0, pose(2, 3) > 0 ? 300 : -300);
+    eye += row_of(s.time_s, pose);
+  }
+  const std::string command = "calibrate hand-eye --poses " + scratch.file("hand.csv", hand) + " --eye-poses " +
+                              scratch.file("eye.csv", eye) + " --json " + (scratch / "x.json").string();
+  const auto done = run("birdseye", command);
+  EXPECT_EQ(done.code, 0) << done.output;
+  EXPECT_EQ(read_json(scratch / "x.json")["verdict"], "marginal") << done.output;
+  EXPECT_THAT(done.output, HasSubstr("or does the scope turn in a trocar there?"));
+  const auto asked = run("birdseye", command + " --at 0,0,0");
+  EXPECT_EQ(asked.output.find("trocar"), std::string::npos) << asked.output;
+}
+
 /// What OpenCV finds is where the board is in the camera's frame.
 TEST(CalibrateHandEyeCommand, BothStreamsInvertedAreNoHandEye) {
   const Scratch scratch;

@@ -346,10 +346,10 @@ TEST(FieldCheckCommand, DayByDayUntilMetalComes) {
                              (scratch / "r.html").string() + " --measured ";
   for (unsigned day = 1; day <= 10; ++day) {
     const auto done =
-        run("birdseye", common + scratch.file("m.csv", places_csv(0, day)) + fmt::format(" --when 'day {}'", day));
+        run("birdseye", common + scratch.file("m.csv", places_csv(0, day)) + fmt::format(" --when 2026-11-{:02}", day));
     ASSERT_EQ(done.code, 0) << done.output;
   }
-  const auto bent = run("birdseye", common + scratch.file("m.csv", places_csv(3.5, 99)) + " --when 'a,day'");
+  const auto bent = run("birdseye", common + scratch.file("m.csv", places_csv(3.5, 99)) + " --when 2026-11-11T08:30");
   EXPECT_EQ(bent.code, 3) << bent.output;
   const nlohmann::json r = read_json(scratch / "r.json");
   EXPECT_EQ(r["verdict"], "fail");
@@ -358,7 +358,7 @@ TEST(FieldCheckCommand, DayByDayUntilMetalComes) {
   EXPECT_GT(r["rms_mm"].get<double>(), r["limits"]["rms_mm"]["high"].get<double>());
   const std::string kept = testing::contents_of(history);
   EXPECT_EQ(std::count(kept.begin(), kept.end(), '\n'), 12);
-  EXPECT_NE(kept.find("\na-day,"), std::string::npos);
+  EXPECT_NE(kept.find("\n2026-11-11T08:30,"), std::string::npos);
   EXPECT_NE(testing::contents_of(scratch / "r.html").find("+3 sigma"), std::string::npos);
 }
 
@@ -381,17 +381,17 @@ TEST(FieldCheckCommand, InputThatCannotBeUsedIsRefusedAndNoDayIsAdded) {
                  "calibrate field check --plate " + scratch.file("plate2.csv", whole + "d2,1,0,0\n") + " --history " +
                      history.string() + " --measured " + scratch.file("w.csv", whole),
                  {"plate2.csv: has \"d2\" twice"}, history);
+  for (const std::string day : {"blah", "2026-02-30", "2026-11-1", "2026-11-29T24:00"})
+    expect_refused("birdseye", common + scratch.file("w.csv", whole) + " --when " + day,
+                   {"--when", day + "\" is no day", "2026-11-29"}, history);
   expect_refused("birdseye",
                  common + scratch.file("w.csv", whole) + " --json " + (scratch / "no_folder/r.json").string(),
                  {"r.json"}, history);
-  std::ofstream(history) << "when,rms_mm,scale_percent,worst_mm,worst_place\nfirst-day,0.1,0,0.1,d1\n";
-  expect_refused("birdseye",
-                 common + scratch.file("t.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\nd3,0,80,0\nd4,80,80,0\n") +
-                     " --when 'first day'",
-                 {"h.csv", "has a day first-day already", "--when"});
+  std::ofstream(history) << "when,rms_mm,scale_percent,worst_mm,worst_place\n2026-11-01,0.1,0,0.1,d1\n";
+  expect_refused("birdseye", common + scratch.file("w.csv", whole) + " --when 2026-11-01",
+                 {"h.csv", "has a day 2026-11-01 already", "--when"});
   std::ofstream(history) << "when,rms_mm,scale_percent,worst_mm,worst_place\nmonday,much,0,0,d1\n";
-  expect_refused("birdseye", common + scratch.file("d.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\nd3,0,80,0\nd4,80,80,0\n"),
-                 {"h.csv:2"});
+  expect_refused("birdseye", common + scratch.file("w.csv", whole), {"h.csv:2"});
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "host/texts/texts.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
@@ -58,6 +59,18 @@ TEST(DemoReport, SaysWhatWasNotedOfTheCt) {
   ASSERT_TRUE(write_demo_report(scratch.path(), figures));
   EXPECT_EQ(nlohmann::json::parse(text_in(scratch / "report.json"))["notes"], figures.notes);
   EXPECT_NE(text_in(scratch / "report.html").find(figures.notes.front()), std::string::npos);
+}
+
+/// Frames before the first showing are counted by themselves, and would seem to be counted twice.
+TEST(DemoReport, AVideoThatHasToShowItAnewIsNotTheOneThatHasNotShownItYet) {
+  DemoFigures figures;
+  figures.note_hidden(words("why_video_untold"));
+  ASSERT_EQ(figures.hidden_because.size(), 1U);
+  const std::string& why = figures.hidden_because.begin()->first;
+  EXPECT_EQ(why.find("has not shown yet"), std::string::npos) << why;
+  EXPECT_NE(why.find("had to show it anew"), std::string::npos) << why;
+  figures.note_hidden("the pose is 123 ms old");
+  EXPECT_TRUE(figures.hidden_because.contains("the pose is ... ms old"));
 }
 
 TEST(DemoReport, ShowsNoPairsWhereNothingWasFound) {

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "calibration/record/identity.hpp"
 #include "drivers/system/wait.hpp"
 #include "host/doctor/appliance.hpp"
 #include "host/doctor/cameras.hpp"
@@ -333,6 +334,30 @@ TEST(DoctorAppliance, EachInstrumentIsJudgedByItsState) {
   EXPECT_EQ(named(checks, "calibration record").state, CheckState::missing);
   EXPECT_THAT(named(checks, "calibration record").found, HasSubstr("another one"));
   EXPECT_EQ(named(checks, "clock").state, CheckState::not_known);
+}
+
+TEST(DoctorAppliance, ARecordBoundToNothingNamesTheCommandThatBindsIt) {
+  ApplianceTold told;
+  const std::string why =
+      fmt::format("calibration of scope \"\" is not used: {}", calibration::misfit("tracker", {}, {}));
+  told.status = wire::Status{false, why};
+  told.calibration = wire::Calibration{false, why, ""};
+  const std::string command = "birdseye calibrate record FILE --bind cart:18944";
+  auto checks = appliance_checks("cart:18944", told);
+  EXPECT_EQ(named(checks, "status").remedy, command);
+  EXPECT_EQ(named(checks, "calibration record").remedy, command);
+  told.status->text = fmt::format("degraded: camera silent; {}", why);
+  checks = appliance_checks("cart:18944", told);
+  EXPECT_EQ(named(checks, "status").remedy, command + "; see the instruments below, too");
+  // Of another tracker: the instruments are well.
+  told.status->text = "calibration of scope \"\" is not used: the record is of tracker model a; this one's is b";
+  told.calibration->why_not = told.status->text;
+  checks = appliance_checks("cart:18944", told);
+  EXPECT_EQ(named(checks, "status").remedy, "see the calibration record below");
+  EXPECT_THAT(named(checks, "calibration record").remedy, HasSubstr("[calibration] record"));
+  told.calibration->why_not = "calibration: r.json: the record's latency was measured with [camera] delay_ms = 0";
+  checks = appliance_checks("cart:18944", told);
+  EXPECT_THAT(named(checks, "calibration record").remedy, HasSubstr("--server cart:18944 --record FILE"));
 }
 
 TEST(DoctorAppliance, AFewLineErrorsAreNoTroubleAndASteadyTrickleIs) {

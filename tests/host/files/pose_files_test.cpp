@@ -102,6 +102,20 @@ TEST(PoseFiles, WhatIsNoPoseInAFolderIsRejectedByName) {
     EXPECT_TRUE(set->rejected[i].starts_with(expected[i])) << set->rejected[i];
 }
 
+TEST(PoseFiles, MillimetresTakenForMetresAreToldByTheirUnit) {
+  const Scratch scratch;
+  PoseReading metres;
+  metres.mm_per_unit = 1000;
+  const auto set = read_pose_set(
+      scratch.file("p.csv", "0,0.1,0.2,0.3,0,0,0,1\n1,515.266,2,3,0,0,0,1\n2,-3.697314E28,2,3,0,0,0,1\n"), metres);
+  ASSERT_TRUE(set) << set.error().what;
+  ASSERT_EQ(set->rejected.size(), 2U) << all_of(set->rejected);
+  EXPECT_NE(set->rejected[0].find("515266 mm is no position; 515.266 mm is one: the unit of lengths (--unit"),
+            std::string::npos)
+      << set->rejected[0];
+  EXPECT_NE(set->rejected[1].find("a stand-in for a missing one"), std::string::npos) << set->rejected[1];
+}
+
 TEST(PoseFiles, ACsvMayHaveAHeaderRemarksAndAnyOfThreeSeparators) {
   const Scratch scratch;
   for (const std::string& text :
