@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "calibration/base/median.hpp"
 #include "calibration/record/sha256.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/program.hpp"
@@ -266,6 +267,25 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
   return files;
 }
 
+/// What is to be said of places that something else than the views tells of, where some are thought wrong.
+struct WrongPlaces {
+  std::string told;  ///< empty: none is
+  /// Two and a quarter or more, which are no slips of a hand: either they or the views are wrong.
+  bool contradict = false;
+};
+
+WrongPlaces wrong_of(const std::vector<PlaceFit>& fits, const std::string& what, const char* remedy) {
+  std::vector<double> off_mm;
+  for (const PlaceFit& fit : fits) {
+    if (fit.thought_wrong()) off_mm.push_back(fit.off_mm);
+  }
+  if (off_mm.empty()) return {};
+  const std::size_t wrong = off_mm.size();
+  return {fmt::format("{}: {} of {} {} {:.1f} mm (median) off all else and thought to be wrong: {}", what, wrong,
+                      fits.size(), wrong == 1 ? "is" : "are", median_of(std::move(off_mm)), remedy),
+          wrong >= 2 && 4 * wrong >= fits.size()};
+}
+
 ResultFolder folder_of(const RegisterViewsOptions& options) {
   return {options.out, "register views", "result.json",
           "field\\.mha|report\\.html|expected_error\\.png|trace\\.svg|pose\\.txt|"
@@ -301,7 +321,16 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   const double time_s = progress.seconds();
 
   nlohmann::json json = json_of(c, found, time_s);
-  const Verdict verdict = verdict_of(c, found);
+  Verdict verdict = verdict_of(c, found);
+  const WrongPlaces touches = wrong_of(
+      found.touches, fmt::format("{}, [points], places of the surface", options.file.string()),
+      "are they in patient LPS and mm, of the organ as it lies in the views, less the tip's radius? Or leave them out");
+  const WrongPlaces matched =
+      wrong_of(found.matched, fmt::format("{}, landmarks and matched places", options.file.string()),
+               "check where they are named in the CT and in the views, or leave them out");
+  for (const WrongPlaces& wrong : {touches, matched}) {
+    if (wrong.contradict) verdict.add(Grade::marginal, wrong.told);
+  }
   json["verdict"] = name_of(verdict.grade);
   json["reasons"] = verdict.reasons;
   if (auto emptied = make_empty(folder_of(options), {options.file}); !emptied) return emptied.error();
@@ -330,6 +359,8 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   if (auto written = write_files(*files); !written) return written.error();
   progress.keep(fmt::format("{}: {}", (options.out / "report.html").string(), verdict.reasons.front()));
   for (const std::string& note : c.notes) print_line(note);
+  for (std::size_t n = 1; n < verdict.reasons.size(); ++n) print_line(verdict.reasons[n]);
+  if (!touches.told.empty() && !touches.contradict) print_line(touches.told);
   for (std::size_t n = 0; n < found.matched.size(); ++n) {
     if (!found.matched[n].thought_wrong()) continue;
     print_line(fmt::format("{} is {:.1f} mm off all else and was thought to be wrong: check its places",

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "host/registration/rigid/points_in_ct.hpp"
 #include "host/volume/marker_near.hpp"
@@ -63,6 +64,40 @@ std::optional<MarkersSeen> look_for_markers(const Volume& ct, Places places_mm) 
   for (const Eigen::Vector3d& place_mm : turned_mm) seen.turned += shows_marker(ct, place_mm) ? 1 : 0;
   seen.turned_inside = points_outside(ct, turned_mm).empty();
   return seen;
+}
+
+double spread_mm(Places points_mm) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points_mm) middle += point / static_cast<double>(points_mm.size());
+  double sum = 0;
+  for (const Eigen::Vector3d& point : points_mm) sum += (point - middle).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(points_mm.size()));
+}
+
+std::string scale_advice(double scale) {
+  const auto near = [&](double value) { return std::abs(scale / value - 1) < 0.1; };
+  if (near(1000)) return "the touched points seem to be in metres: give mm";
+  if (near(0.001)) return "the points of the CT seem to be in metres: give mm";
+  if (near(10)) return "the touched points seem to be in cm: give mm";
+  if (near(0.1)) return "the points of the CT seem to be in cm: give mm";
+  if (near(25.4)) return "the touched points seem to be in inches: give mm";
+  return "look at the CT's spacing: are its slices as far apart as the file says, and are the CT's points in mm of the "
+         "patient, not in voxels? Is the tracker's scale right?";
+}
+
+std::string axis_scale_advice() {
+  return "is the CT's spacing along this axis right, of a CT the distance of its slices? Import it again";
+}
+
+std::string misfit_advice(Places ct_mm, Places touched_mm, const FiducialJudgement& judged) {
+  const double ratio = spread_mm(ct_mm) / spread_mm(touched_mm);
+  if (ratio > 5 || ratio < 0.2) return scale_advice(ratio);
+  if (judged.mirrored) {
+    return "one of the two files is mirrored: one axis has the wrong sign, or two axes are exchanged (between 3D "
+           "Slicer's RAS and LPS, two have the other sign: that mirrors nothing)";
+  }
+  if (judged.scale == Grade::fail && judged.along_axis) return axis_scale_advice();
+  return "are the points in the same order? --match finds it";
 }
 
 }  // namespace birdseye::host

@@ -45,36 +45,27 @@ Result<calibration::PointFit<Patient, Tracker>> fit_fiducials(const FiducialFile
   return std::move(matched->fit);
 }
 
-/// Root mean square distance from the points' middle.
-double spread_of(const Points& points) {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& point : points) middle += point / static_cast<double>(points.size());
-  double sum = 0;
-  for (const Eigen::Vector3d& point : points) sum += (point - middle).squaredNorm();
-  return std::sqrt(sum / static_cast<double>(points.size()));
-}
+struct Unexplained {
+  double fre_mm = 0;
+  std::size_t points = 0;
+};
 
-/// What a ratio of lengths, CT over touched, looks like.
-std::string scale_advice(double scale) {
-  const auto near = [&](double value) { return std::abs(scale / value - 1) < 0.1; };
-  if (near(1000)) return "the touched points seem to be in metres: give mm";
-  if (near(0.001)) return "the points of the CT seem to be in metres: give mm";
-  if (near(10)) return "the touched points seem to be in cm: give mm";
-  if (near(0.1)) return "the points of the CT seem to be in cm: give mm";
-  if (near(25.4)) return "the touched points seem to be in inches: give mm";
-  return "look at the CT's spacing: are its slices as far apart as the file says, and are the CT's points in mm of the "
-         "patient, not in voxels? Is the tracker's scale right?";
-}
-
-/// What to do where the points do not fit one another, by their shapes.
-std::string misfit_advice(const FiducialInput& input, bool mirrored) {
-  const double ratio = spread_of(input.ct_mm) / spread_of(input.touched_mm);
-  if (ratio > 5 || ratio < 0.2) return scale_advice(ratio);
-  if (mirrored) {
-    return "one of the two files is mirrored: one axis has the wrong sign, or two axes are exchanged (between 3D "
-           "Slicer's RAS and LPS, two have the other sign: that mirrors nothing)";
+/// What is left once all that is told for itself is taken out: neither a touch that is named as wrong, nor another
+/// scale, nor a mirrored file says how well markers were touched. Of four markers and fewer no touch can be named.
+Unexplained unexplained(const FiducialsFound& found) {
+  const calibration::PointShape& shape = found.judged.shape;
+  const std::size_t all = found.fit.residuals_mm.size();
+  Unexplained least{found.fit.fre_rms_mm, all};
+  const auto take = [&](double fre_mm, std::size_t points) {
+    if (fre_mm < least.fre_mm) least = {fre_mm, points};
+  };
+  if (!found.odd.named.empty()) take(found.odd.fre_without_rms_mm, all - found.odd.named.size());
+  if (found.judged.mirrored) take(shape.mirrored_fre_rms_mm, all);
+  if (found.judged.scale != Grade::pass) {
+    take(shape.fre_rms_mm, all);
+    if (found.judged.along_axis) take(found.judged.axis_fre_rms_mm, all);
   }
-  return "are the points in the same order? --match finds it";
+  return least;
 }
 
 std::string list_of(const std::vector<std::size_t>& indices) {
@@ -112,7 +103,7 @@ void judge_shape(Verdict& verdict, const FiducialsFound& out) {
                 fmt::format("lengths from {} in the CT are {:.4g} times those that were touched (sigma {:.2g}); along "
                             "the other axes they are not",
                             axis_in_words(shape.axis), shape.axis_scale, shape.axis_scale_sigma),
-                "is the CT's spacing along this axis right, of a CT the distance of its slices? Import it again");
+                axis_scale_advice());
   } else if (judged.scale != Grade::pass) {
     verdict.add(judged.scale,
                 fmt::format("lengths in the CT are {:.4g} times those that were touched (sigma {:.2g})", shape.scale,
@@ -137,12 +128,13 @@ void judge_places(Verdict& verdict, const FiducialsFound& out) {
   if (out.judged.outside.empty() && out.markers_seen) {
     const MarkersSeen& seen = *out.markers_seen;
     if (seen.only_turned()) {
-      verdict.add(Grade::fail,
-                  fmt::format("the CT shows a marker at {} of the {} places of the CT's file, and at {} with the other "
-                              "sign of x and y",
-                              seen.as_given, seen.places, seen.turned),
-                  "the file is in RAS: give LPS (x and y with the other sign), or 3D Slicer's own .mrk.json or .fcsv, "
-                  "which say their frame");
+      verdict.add(
+          Grade::fail,
+          fmt::format("the CT shows a marker at {} of the {} places of the CT's file, and at {} with the other "
+                      "sign of x and y",
+                      seen.as_given, seen.places, seen.turned),
+          "the file looks like RAS: give LPS (x and y with the other sign), or 3D Slicer's own .mrk.json or .fcsv, "
+          "which say their frame");
     } else if (seen.none()) {
       verdict.add(seen.turned_inside ? Grade::marginal : Grade::pass,
                   fmt::format("the CT shows no marker of a usual kind at any place of the CT's file{}",
@@ -279,15 +271,27 @@ Result<FiducialsFound> register_fiducials(const FiducialFiles& files, FiducialIn
   if (auto two = refuse_one_file_twice(files.ct, files.tracker, input.ct_mm, input.touched_mm); !two)
     return two.error();
   out.fit = *std::move(fitted);
-  out.localisation = files.localisation_mm
-                         ? calibration::LocalisationError{*files.localisation_mm, *files.localisation_mm, 0}
-                         : calibration::localisation_error_of(out.fit.fre_rms_mm, input.ct_mm.size());
-  out.odd = calibration::find_odd_points(input.ct_mm, input.touched_mm, files.localisation_mm);
-  out.judged = judge_fiducial_points(input.ct_mm, input.touched_mm, files.localisation_mm, out.odd,
-                                     input.volume ? &*input.volume : nullptr);
+  std::optional<double> stated_mm = files.localisation_mm;
+  const Volume* const volume = input.volume ? &*input.volume : nullptr;
+  out.odd = calibration::find_odd_points(input.ct_mm, input.touched_mm, stated_mm);
+  out.judged = judge_fiducial_points(input.ct_mm, input.touched_mm, stated_mm, out.odd, volume);
+  if (stated_mm) {
+    const Unexplained left = unexplained(out);
+    out.times_over_stated = times_over_stated(left.fre_mm, left.points, *stated_mm);
+  }
+  if (out.times_over_stated) {  // all that rests on it would be too sure
+    stated_mm.reset();
+    out.odd = calibration::find_odd_points(input.ct_mm, input.touched_mm);
+    out.judged = judge_fiducial_points(input.ct_mm, input.touched_mm, stated_mm, out.odd, volume);
+  }
+  out.localisation = stated_mm ? calibration::LocalisationError{*stated_mm, *stated_mm, 0}
+                               : calibration::localisation_error_of(out.fit.fre_rms_mm, input.ct_mm.size());
+  const bool by_order = !files.match && input.names.empty();
+  if (by_order && out.fit.fre_rms_mm <= kLargestFre_mm)
+    out.rival_order_fre_mm = rival_order_fre_mm(input.ct_mm, input.touched_mm);
   if (out.judged.mirrored) out.odd = {};  // of a mirrored file no touch is the wrong one
-  out.ct_spread_mm = spread_of(input.ct_mm);
-  out.misfit_advice = misfit_advice(input, out.judged.mirrored);
+  out.ct_spread_mm = spread_mm(input.ct_mm);
+  out.misfit_advice = misfit_advice(input.ct_mm, input.touched_mm, out.judged);
   const calibration::TargetError predicted(input.ct_mm, out.localisation.rms_mm);
   for (const Eigen::Vector3d& target : input.targets_mm) out.tre_mm.push_back(predicted.rms_mm(target));
   if (input.volume) {
@@ -320,6 +324,19 @@ Verdict judge_fiducials(const FiducialsFound& out) {
     verdict.judge("predicted error over the CT, median", out.range->median_mm, "mm", 3, 5,
                   fits ? "place markers round what will be operated on, and name it with --targets" : "");
   }
+  if (out.times_over_stated) {
+    verdict.add(Grade::marginal,
+                fmt::format("residuals are {:.1f} times what --fle allows: errors are predicted by the residuals",
+                            *out.times_over_stated),
+                "touch the markers again, or give the --fle that a hand and a CT reach");
+  }
+  if (out.rival_order_fre_mm) {
+    verdict.add(Grade::marginal,
+                fmt::format("the markers cannot be told apart by their distances (FRE {:.1f} mm, and {:.1f} mm in "
+                            "another order)",
+                            out.fit.fre_rms_mm, *out.rival_order_fre_mm),
+                "give each point the same name in both files, place the markers less evenly, or touch more");
+  }
   judge_shape(verdict, out);
   judge_places(verdict, out);
   const bool wrong = out.odd.verdict == OddPointsVerdict::named || out.odd.verdict == OddPointsVerdict::suspected;
@@ -342,6 +359,8 @@ nlohmann::json fiducials_json(const FiducialInput& input, const FiducialsFound& 
   json["notes"] = input.notes;
   json["fle_rms_mm"] = out.localisation.rms_mm;
   json["fle_upper95_mm"] = out.localisation.upper95_mm;
+  if (out.times_over_stated) json["fle_times_over_stated"] = *out.times_over_stated;
+  if (out.rival_order_fre_mm) json["rival_order_fre_rms_mm"] = *out.rival_order_fre_mm;
   if (!input.ct_of_touch.empty()) {
     for (const std::size_t i : input.ct_of_touch) json["ct_of_touch"].push_back(i + 1);
   }
@@ -373,6 +392,7 @@ nlohmann::json fiducials_json(const FiducialInput& input, const FiducialsFound& 
     const SurfaceRefinement& r = *out.refinement;
     json["surface"] = {{"accepted", r.accepted},
                        {"points", r.points},
+                       {"places", r.places},
                        {"kept", r.kept},
                        {"rms_before_mm", r.rms_before_mm},
                        {"rms_after_mm", r.rms_after_mm},

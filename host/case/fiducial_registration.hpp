@@ -49,7 +49,9 @@ struct FiducialInput {
 /// All that was found out.
 struct FiducialsFound {
   calibration::PointFit<Patient, Tracker> fit;
-  calibration::LocalisationError localisation;
+  calibration::LocalisationError localisation;  ///< as it was stated, unless the residuals refute that
+  std::optional<double> times_over_stated;   ///< how many times the stated one the residuals are, where they refute it
+  std::optional<double> rival_order_fre_mm;  ///< of points paired by order: of another order that fits as well
   calibration::OddPoints odd;
   FiducialJudgement judged;
   double ct_spread_mm = 0;                   ///< root mean square distance of the CT's markers from their middle

@@ -27,6 +27,10 @@ Cells cells_of(std::span<const SeenPoint> points) {
   return out;
 }
 
+/// What all rows of a file have wrong together, of one axis: the pointer's tip, and where the views have the patient,
+/// are some tenths of a millimetre off, and a file does not say by how much.
+constexpr double kRowsShift_mm = 0.3;
+
 }  // namespace
 
 std::vector<SeenPoint> gathered_points(std::span<const SeenPoint> points, const SeenSurface& surface) {
@@ -76,6 +80,37 @@ std::vector<SeenPoint> gathered_points(std::span<const SeenPoint> points, const 
     gathered.by_lens_mm = by_lens_mm;
     if (points[members.front()].from_camera) gathered.from_camera = from_camera.normalized();
     out.push_back(gathered);
+  }
+  return out;
+}
+
+GatheredRows gathered_rows(std::span<const SeenPoint> rows, const SeenSurface& surface) {
+  constexpr double kAgreeSigmas = 3;
+  std::vector<SeenPoint> sound(rows.begin(), rows.end());
+  std::vector<double> off_mm;
+  for (SeenPoint& row : sound) {
+    row.sigma_mm = std::max(row.sigma_mm, kLeastSigma_mm);
+    row.shift_mm = std::max(row.shift_mm, kRowsShift_mm);
+    off_mm.push_back(surface.distance().distance_mm(row.place_mm));
+  }
+  GatheredRows out;
+  out.of_row.resize(sound.size());
+  for (auto [cell, members] : cells_of(sound)) {
+    std::ranges::sort(members, {}, [&](std::size_t i) { return off_mm[i]; });
+    for (auto first = members.begin(); first != members.end();) {
+      auto end = first + 1;
+      // From the first, for a chain of rows that agree each with the next has ends that contradict one another.
+      while (end != members.end() &&
+             off_mm[*end] - off_mm[*first] <= kAgreeSigmas * std::hypot(sound[*end].sigma_mm, sound[*first].sigma_mm))
+        ++end;
+      std::vector<SeenPoint> alike;
+      for (auto member = first; member != end; ++member) {
+        alike.push_back(sound[*member]);
+        out.of_row[*member] = out.points.size();
+      }
+      out.points.push_back(alike.size() == 1 ? alike.front() : gathered_points(alike, surface).front());
+      first = end;
+    }
   }
   return out;
 }

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "calibration/base/median.hpp"
@@ -137,20 +138,35 @@ std::vector<VideoView> posed(std::vector<VideoView> views, std::span<const Pinho
   return views;
 }
 
-/// How the touches, which are the last of the points, and what is matched fit the result.
-void tell_fits(const GeometrySettings& settings, std::span<const SeenPoint> touches, const BelievedDeformation& found,
-               const SeenSurface& surface, ViewRegistration& out) {
+/// Matched places of which no axis is known better than a place of the surface can be: smaller errors make places that
+/// contradict one another fold whatever the views say.
+std::vector<MatchedPoint> no_surer_than_can_be(std::vector<MatchedPoint> matched) {
+  constexpr double kLeastSigma_mm = 0.15;
+  for (MatchedPoint& point : matched) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(point.covariance_mm2);
+    if (axes.eigenvalues()[0] >= kLeastSigma_mm * kLeastSigma_mm) continue;
+    const Eigen::Vector3d variances_mm2 = axes.eigenvalues().cwiseMax(kLeastSigma_mm * kLeastSigma_mm);
+    point.covariance_mm2 = axes.eigenvectors() * variances_mm2.asDiagonal() * axes.eigenvectors().transpose();
+  }
+  return matched;
+}
+
+/// How the touches fit the result, each by the weight of its point, and what is matched. Of the deformation's points
+/// those of the touches are the last, so many.
+void tell_fits(std::span<const SeenPoint> touches, std::span<const std::size_t> point_of_touch, std::size_t points,
+               std::span<const MatchedPoint> matched, const BelievedDeformation& found, const SeenSurface& surface,
+               ViewRegistration& out) {
   constexpr double kKnown_mm = 10;
   for (std::size_t i = 0; i < touches.size(); ++i) {
     PlaceFit fit{std::abs(surface.distance().distance_mm(touches[i].place_mm)), 0};
     for (std::size_t n = 0; n < found.fits.size(); ++n) {
       const auto weights = found.fits[n].weights();
-      fit.weight += found.beliefs[n] * weights[weights.size() - touches.size() + i];
+      fit.weight += found.beliefs[n] * weights[weights.size() - points + point_of_touch[i]];
     }
     out.touches.push_back(fit);
   }
-  for (std::size_t i = 0; i < settings.matched.size(); ++i) {
-    const MatchedPoint& point = settings.matched[i];
+  for (std::size_t i = 0; i < matched.size(); ++i) {
+    const MatchedPoint& point = matched[i];
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(point.covariance_mm2);
     const Eigen::Vector3d off_mm =
         axes.eigenvectors().transpose() * (seen_place(found.mean, point.rest_mm) - point.seen_mm);
@@ -193,8 +209,16 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     out.adjusted = std::move(adjusted->poses);
   }
 
-  const std::vector<SeenPoint> touches =
-      settings.gather_touches ? gathered_points(settings.touches, rest) : settings.touches;
+  GatheredRows gathered;
+  if (settings.gather_touches) {
+    gathered.points = gathered_points(settings.touches, rest);
+    gathered.of_row.resize(gathered.points.size());
+    std::iota(gathered.of_row.begin(), gathered.of_row.end(), std::size_t{0});
+  } else {
+    gathered = gathered_rows(settings.touches, rest);
+  }
+  const std::vector<SeenPoint>& touches = gathered.points;
+  const std::vector<MatchedPoint> matched = no_surer_than_can_be(settings.matched);
   // Each round looks nearer to the surface as the round before left it.
   struct Round {
     double grid_px, span_mm, step_mm, outline_mm;
@@ -235,7 +259,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
       }
     }
     points.insert(points.end(), touches.begin(), touches.end());
-    const bool nothing = points.empty() && settings.matched.empty();
+    const bool nothing = points.empty() && matched.empty();
     if (nothing && (round.outline_mm == 0 || !found.fits.empty())) continue;  // other rounds may say more
     if (nothing) {
       return Error{Errc::not_found,
@@ -251,7 +275,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
       points[i].by_common_mm = common->at(points[i].place_mm);
       points[i].place_mm += points[i].by_common_mm * errors;
     }
-    auto believed = believe(distance, points, more, found, settings.watch, settings.matched);
+    auto believed = believe(distance, points, more, found, settings.watch, matched);
     if (!believed && settings.watch.cancelled()) return called_off();
     if (!believed) {
       return Error{Errc::degenerate,
@@ -261,7 +285,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     errors.setZero();
     for (std::size_t n = 0; n < found.fits.size(); ++n) errors += found.beliefs[n] * found.fits[n].common_errors();
     move_views();
-    out.evidence_of_motion_nats = evidence_of_motion_nats(distance, points, found, settings.matched);
+    out.evidence_of_motion_nats = evidence_of_motion_nats(distance, points, found, matched);
     ++out.evaluations;
     settings.progress(fmt::format("round {} of {}: {} places by stereo, {} by outlines; most believed: {}",
                                   out.evaluations, kRounds.size(), *out.stereo_points, by_outlines.size(),
@@ -278,12 +302,14 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     out.min_jacobian = 1;
   }
   const SeenSurface surface(seen_distance(distance, found.mean));
-  if (!out.folded) tell_fits(settings, touches, found, surface, out);
+  if (!out.folded)
+    tell_fits(settings.gather_touches ? touches : settings.touches, gathered.of_row, touches.size(), matched, found,
+              surface, out);
   for (const PinholeView& view : seen_by) out.outline_off_mm.push_back(outline_off_mm(view, surface));
   if (settings.estimate_uncertainty && !out.folded) {
     out.expected = expected_errors(distance, found, seen_by, settings.targets_at_rest_mm);
     if (out.expected->surface) out.uncertainty_mm = out.expected->surface->rms_mm;
-    out.held_out = held_out_view(distance, seen_by, found, touches, settings.matched);
+    out.held_out = held_out_view(distance, seen_by, found, touches, matched);
     out.agreement = view_agreement(as_given, seen_by, surface);
     const auto& stated = settings.camera_covariances;
     out.lens_error_counted =

@@ -26,8 +26,9 @@ struct GeometrySettings {
   /// Places that are on the organ's surface now, whatever tells of them: a pointer's tip, another modality. No camera
   /// sees them.
   std::vector<SeenPoint> touches;
-  /// Whether touches close together are told as one, for their errors are alike: those of a stroke. The result's
-  /// touches are the gathered ones then.
+  /// Whether the touches are of strokes: those close together are told as one, for their errors are alike, and the
+  /// result's touches are the gathered ones. Else they are rows, of which those close together that agree count as one
+  /// (gathered_rows), and the result tells of each.
   bool gather_touches = false;
   /// How well each view's lens is known: what that does to the places counts in every error that is to be expected.
   /// None at all, or one a view; an empty one: its lens is taken for exact.

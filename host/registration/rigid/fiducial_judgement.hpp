@@ -24,6 +24,7 @@ struct FiducialJudgement {
   bool handedness_open = false;      ///< marginal: they lie so nearly in a plane that this cannot be told
   Grade scale = Grade::pass;         ///< of lengths in the CT over those that were touched
   bool along_axis = false;           ///< that scale is of one axis of the CT alone: shape.axis
+  double axis_fre_rms_mm = 0;        ///< of the fit with that axis's scale
   std::vector<std::size_t> outside;  ///< a fail: by index, those that are nowhere at the CT's patient
   bool ras = false;                  ///< all would be inside if their places were in RAS
   std::string ct_reach;              ///< where the CT lies, in words; empty without a CT
@@ -36,6 +37,10 @@ FiducialJudgement judge_fiducial_points(std::span<const Eigen::Vector3d> ct_mm,
                                         std::span<const Eigen::Vector3d> touched_mm,
                                         std::optional<double> localisation_rms_mm, const calibration::OddPoints& odd,
                                         const Volume* ct);
+
+/// How many times as large as it was said to be the localisation error must be to leave such residuals in a rigid fit
+/// of so many points. Empty where chance leaves as much in over 1 of 1000 sound sets, by their chi-square distribution.
+std::optional<double> times_over_stated(double fre_rms_mm, std::size_t points, double localisation_rms_mm);
 
 /// Of touches that fit no choice of markers, or fit it poorly: the judgement by the choice that their mirror image
 /// fits, where it shows that they are mirrored.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "calibration/base/units.hpp"
+#include "calibration/points/point_error.hpp"
 
 namespace birdseye::host {
 
@@ -19,6 +20,7 @@ using Points = std::span<const Eigen::Vector3d>;
 constexpr double kClearlyBetter = 3, kClearlyWorse_mm = 2;
 constexpr double kWorstFre_mm = 15;
 constexpr std::size_t kMostLooks = 30'000'000;  // a second or so
+constexpr std::size_t kLooksOfAFit = 100;       // as long as one fit takes
 
 Eigen::MatrixXd distances(Points points) {
   const auto n = static_cast<Eigen::Index>(points.size());
@@ -78,6 +80,7 @@ class AssignmentSearch {
   }
 
   void weigh() {
+    looks_ += kLooksOfAFit;
     const auto fit = calibration::detail::fit_rigid(ct_in_order(order_), touched_mm_);
     if (!fit) return;
     double squares = 0;
@@ -194,6 +197,25 @@ std::vector<Eigen::Vector3d> without(Points points, std::size_t left_out) {
 }
 
 }  // namespace
+
+std::optional<double> rival_order_fre_mm(Points ct_in_patient_mm, Points touched_in_tracker_mm) {
+  constexpr double kClearOdds = 100;
+  const auto n = static_cast<double>(touched_in_tracker_mm.size());
+  const auto given = calibration::fit_points<Patient, Tracker>(ct_in_patient_mm, touched_in_tracker_mm);
+  if (!given) return std::nullopt;
+  AssignmentSearch search(ct_in_patient_mm, touched_in_tracker_mm);
+  search.run();  // of one that gave up, what it found counts all the same
+  const bool given_is_best = std::ranges::is_sorted(search.best_order());
+  const double rival_mm = given_is_best ? search.second_mm() : search.best_mm();
+  if (!search.found() || !std::isfinite(rival_mm)) return std::nullopt;
+  // By the likelihood of the residuals' variance, of which three coordinates a point less six are free.
+  const double freedom = 3 * n - 6;
+  const double finest_mm2 = freedom * calibration::kFinestLocalisation_mm * calibration::kFinestLocalisation_mm / 3;
+  const double odds = std::pow(
+      (n * rival_mm * rival_mm + finest_mm2) / (n * given->fre_rms_mm * given->fre_rms_mm + finest_mm2), 0.5 * freedom);
+  if (odds > kClearOdds) return std::nullopt;
+  return rival_mm;
+}
 
 std::optional<std::size_t> odd_touch(Points ct_in_patient_mm, Points touched_in_tracker_mm,
                                      Points ct_of_touches_in_patient_mm, double good_fit_mm) {

@@ -26,6 +26,12 @@ struct MatchedFit {
 Result<MatchedFit> match_and_fit(std::span<const Eigen::Vector3d> ct_in_patient_mm,
                                  std::span<const Eigen::Vector3d> touched_in_tracker_mm);
 
+/// Of touches that were given in the order of the CT's points, as many: the FRE of the other order that fits best,
+/// where the residuals do not speak for the given order against it by odds of 100. Empty where they do. Somebody chose
+/// the given order, so that less speaks for it than match_and_fit asks for, which knows of none.
+std::optional<double> rival_order_fre_mm(std::span<const Eigen::Vector3d> ct_in_patient_mm,
+                                         std::span<const Eigen::Vector3d> touched_in_tracker_mm);
+
 /// Which touch is off, from 0: without it the others fit to good_fit_mm, and without any other plainly worse. Empty
 /// where that cannot be told. ct_of_touches_in_patient_mm: the CT's point of each touch; empty where it is not known
 /// which is which.

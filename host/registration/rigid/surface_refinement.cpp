@@ -4,7 +4,10 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <map>
 
 #include "calibration/geometry/rotations.hpp"
 #include "calibration/points/point_error.hpp"
@@ -25,6 +28,50 @@ constexpr double kStill_mm = 1e-4;
 constexpr double kChance = 0.01;
 /// Neither CT surface nor fiducials are better than this, whatever few residuals say.
 constexpr double kFinest_mm = 0.3;
+
+/// A hand that holds still gives one place many times over, and all of them err together: by the tip's pressure, by the
+/// tracker there. Places nearer to one another than a pointer's ball is wide count as one.
+constexpr double kOnePlace_mm = 3;
+
+/// The touched places, one for all that lie within kOnePlace_mm of it: their middle.
+std::vector<Eigen::Vector3d> thinned(Points touched_mm) {
+  struct Place {
+    Eigen::Vector3d first_mm, sum_mm;
+    double count = 1;
+  };
+  using Cell = std::array<std::int64_t, 3>;
+  const auto cell_of = [](const Eigen::Vector3d& p) {
+    const Eigen::Vector3d cell = (p / kOnePlace_mm).array().floor();
+    return Cell{static_cast<std::int64_t>(cell.x()), static_cast<std::int64_t>(cell.y()),
+                static_cast<std::int64_t>(cell.z())};
+  };
+  std::vector<Place> places;
+  std::map<Cell, std::vector<std::size_t>> by_cell;
+  const auto place_at = [&](const Eigen::Vector3d& p) -> Place* {
+    const Cell at = cell_of(p);
+    for (std::int64_t n = 0; n < 27; ++n) {
+      const auto cell = by_cell.find({at[0] + n / 9 - 1, at[1] + n / 3 % 3 - 1, at[2] + n % 3 - 1});
+      if (cell == by_cell.end()) continue;
+      for (const std::size_t i : cell->second) {
+        if ((places[i].first_mm - p).norm() < kOnePlace_mm) return &places[i];
+      }
+    }
+    return nullptr;
+  };
+  for (const Eigen::Vector3d& p : touched_mm) {
+    if (Place* const place = place_at(p)) {
+      place->sum_mm += p;
+      place->count += 1;
+    } else {
+      by_cell[cell_of(p)].push_back(places.size());
+      places.push_back({p, p});
+    }
+  }
+  std::vector<Eigen::Vector3d> out;
+  out.reserve(places.size());
+  for (const Place& place : places) out.emplace_back(place.sum_mm / place.count);
+  return out;
+}
 
 struct Pair {
   Eigen::Vector3d here_mm;
@@ -81,21 +128,33 @@ double allowed_mm(std::size_t n, double localisation_mm, int degrees_of_freedom)
 
 }  // namespace
 
-Result<SurfaceRefinement> refine_on_surface(const Surface& surface, Points touched_mm, const FiducialAnchor& anchor) {
-  if (touched_mm.size() < kFewest) {
-    return Error{Errc::degenerate, fmt::format("{} points on the surface: touch at least {}, spread over it",
-                                               touched_mm.size(), kFewest)};
-  }
-  for (const Eigen::Vector3d& p : touched_mm) {
+Result<SurfaceRefinement> refine_on_surface(const Surface& surface, Points given_mm, const FiducialAnchor& anchor) {
+  constexpr double kFarthest_mm = 1e9;  // what is farther has no cell
+  for (const Eigen::Vector3d& p : given_mm) {
     if (!p.allFinite()) return Error{Errc::bad_value, "a surface point has a coordinate that is not a finite number"};
+    if (p.cwiseAbs().maxCoeff() >= kFarthest_mm) {
+      return Error{Errc::bad_value,
+                   "a surface point has a coordinate of a thousand kilometres and more: is the file in "
+                   "mm, with a number for each coordinate?"};
+    }
+  }
+  const std::vector<Eigen::Vector3d> touched_mm = thinned(given_mm);
+  if (touched_mm.size() < kFewest) {
+    const std::string places = touched_mm.size() == given_mm.size()
+                                   ? fmt::format("{} points on the surface", given_mm.size())
+                                   : fmt::format("{} points on the surface (places {} mm apart: {})", given_mm.size(),
+                                                 kOnePlace_mm, touched_mm.size());
+    return Error{Errc::degenerate, fmt::format("{}: touch at least {}, spread over it", places, kFewest)};
   }
   const SurfaceIndex index(surface);
   const double localisation_mm = std::max(anchor.localisation_rms_mm, kFinest_mm);
   Pose pose = anchor.patient_from_tracker;
   SurfaceRefinement out;
-  out.points = touched_mm.size();
+  out.points = given_mm.size();
+  out.places = touched_mm.size();
   std::vector<Pair> pairs = pairs_of(index, touched_mm, pose);
-  out.rms_before_mm = rms_mm(pairs);
+  const double places_before_mm = rms_mm(pairs);
+  out.rms_before_mm = rms_mm(pairs_of(index, given_mm, pose));
   for (double step_mm = 1; out.iterations < kMostIterations && step_mm > kStill_mm; ++out.iterations) {
     Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
     for (const Pair& p : pairs) pivot += p.here_mm / static_cast<double>(pairs.size());
@@ -122,11 +181,11 @@ Result<SurfaceRefinement> refine_on_surface(const Surface& surface, Points touch
     pairs = pairs_of(index, touched_mm, pose);
   }
   out.kept = pairs.size();
-  out.rms_after_mm = rms_mm(pairs);
+  out.rms_after_mm = rms_mm(pairs_of(index, given_mm, pose));
   out.moved_mm = moved_rms_mm(anchor.touched_in_tracker_mm, pose, anchor.patient_from_tracker);
   out.turned_rad = rotation_angle_between(pose.rotation(), anchor.patient_from_tracker.rotation());
   out.allowed_mm = allowed_mm(anchor.touched_in_tracker_mm.size(), localisation_mm, anchor.degrees_of_freedom);
-  out.accepted = out.moved_mm <= out.allowed_mm && out.rms_after_mm < out.rms_before_mm;
+  out.accepted = out.moved_mm <= out.allowed_mm && rms_mm(pairs) < places_before_mm;
   out.surface_pose = pose;
   out.patient_from_tracker = out.accepted ? pose : anchor.patient_from_tracker;
   const std::string distances =

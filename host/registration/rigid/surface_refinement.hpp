@@ -21,7 +21,7 @@ struct SurfaceRefinement {
   Transform<Patient, Tracker> patient_from_tracker;
   Transform<Patient, Tracker> surface_pose;  ///< where the surface puts it, accepted or not
   bool accepted = false;
-  std::size_t points = 0, kept = 0;  ///< touched points, and how many of them count
+  std::size_t points = 0, places = 0, kept = 0;  ///< touched points, their places 3 mm apart, and how many count
   /// Distance of the touched points from the surface, root mean square of the nearest 90 %.
   double rms_before_mm = 0, rms_after_mm = 0;
   double moved_mm = 0;  ///< of the fiducials by the refinement, root mean square
@@ -32,11 +32,12 @@ struct SurfaceRefinement {
 };
 
 /// Moves touched points onto the patient's surface: iterative closest points, with the distance along the surface's
-/// normal (Y. Chen, G. Medioni, 1992), leaving out the farthest tenth of the points. The fiducials keep their weight,
+/// normal (Y. Chen, G. Medioni, 1992), leaving out the farthest tenth of the points. Points within 3 mm of one another
+/// are one place, their middle: a hand that holds still says no more than once. The fiducials keep their weight,
 /// so that what the surface leaves open (a plane slides along itself) stays where the fiducials put it.
 ///
 /// The fiducials are right to within their localisation error. A surface that moves them farther than that explains is
-/// another surface, or was touched elsewhere: it is refused, and `told` says so. Refuses fewer than ten points
+/// another surface, or was touched elsewhere: it is refused, and `told` says so. Refuses fewer than ten places
 /// (Errc::degenerate) and coordinates that are not finite.
 Result<SurfaceRefinement> refine_on_surface(const Surface& surface,
                                             std::span<const Eigen::Vector3d> touched_in_tracker_mm,

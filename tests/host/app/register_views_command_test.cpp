@@ -351,6 +351,52 @@ TEST(RegisterViewsCommand, GeometryTakesTouchesLandmarksAndOtherPlaces) {
   EXPECT_LT(matched["expected_error"]["inside"]["rms_mm"], without["expected_error"]["inside"]["rms_mm"]);
 }
 
+TEST(RegisterViewsCommand, GeometryTellsTouchesThatTheViewsContradictAndCountsOneOnceHoweverOftenItIsGiven) {
+  const Scratch scratch;
+  const auto made =
+      run("birdseye-sim", "case --out " + (scratch / "c").string() + " --seed 2 --views 4 --size 384x288 --dof 81");
+  ASSERT_EQ(made.code, 0) << made.output;
+  const fs::path file = scratch / "c/case.toml";
+  const auto c = host::read_case(file);
+  ASSERT_TRUE(c) << c.error().what;
+  const std::string plain = contents_of(file) + "\n[points]\npath = \"lie.csv\"\n";
+  const auto of_points = [&](const std::string& rows) {
+    std::ofstream(scratch / "c/lie.csv") << "x_mm,y_mm,z_mm,sigma_mm\n" << rows;
+    std::ofstream(file) << plain;
+    return run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
+  };
+  // Each 8 mm off, away from the middle of the surface.
+  const auto places = of_kind(*c, "surface", 20);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const host::Landmark& one : places) middle += one.deformed_mm / static_cast<double>(places.size());
+  std::string off, repeated;
+  for (const host::Landmark& one : places) {
+    const Eigen::Vector3d place = one.deformed_mm + 8 * (one.deformed_mm - middle).normalized();
+    off += fmt::format("{:.4f},1\n", fmt::join(place, ","));
+  }
+  const Eigen::Vector3d pressed = places.front().deformed_mm + 3 * (places.front().deformed_mm - middle).normalized();
+  for (int i = 0; i < 300; ++i) repeated += fmt::format("{:.4f},0.01\n", fmt::join(pressed, ","));
+  const auto told = of_points(off);
+  const nlohmann::json lied = read_json(scratch / "r.json");
+  EXPECT_NE(lied["verdict"], "pass") << told.output;
+  EXPECT_GE(lied["surface_points"]["thought_wrong"], 10);
+  EXPECT_NE(told.output.find("case.toml, [points], places of the surface"), std::string::npos) << told.output;
+  EXPECT_NE(told.output.find("thought to be wrong"), std::string::npos) << told.output;
+  EXPECT_GE(lied["reasons"].size(), 2U) << "what is known of the target stays: " << lied["reasons"];
+  // One that is wrong is told, and is a slip of a hand.
+  const auto slip = of_points(off.substr(0, off.find('\n') + 1));
+  const nlohmann::json slipped = read_json(scratch / "r.json");
+  EXPECT_EQ(slipped["surface_points"]["thought_wrong"], 1);
+  EXPECT_EQ(slipped["reasons"].size(), 1U) << slipped["reasons"];
+  EXPECT_NE(slip.output.find("1 of 1 is"), std::string::npos) << slip.output;
+  (void)of_points(repeated.substr(0, repeated.find('\n') + 1));
+  const double once_mm = read_json(scratch / "r.json")["tre_after_mm_mean"];
+  (void)of_points(repeated);
+  const nlohmann::json many = read_json(scratch / "r.json");
+  EXPECT_EQ(many["surface_points"]["used"], 300);
+  EXPECT_LT(many["tre_after_mm_mean"].get<double>(), once_mm + 0.3);
+}
+
 TEST(RegisterViewsCommand, RefusesLandmarksAndPlacesThatCannotBe) {
   const Scratch scratch;
   make_case(scratch);

@@ -283,5 +283,35 @@ TEST(GatheredPoints, KeepTheShiftThatTheyHaveTogether) {
   for (const SeenPoint& point : gathered) EXPECT_EQ(point.shift_mm, 0.8);
 }
 
+TEST(GatheredRows, OneTouchThreeHundredTimesIsOneAndWhatContradictsItStaysApart) {
+  const SeenSurface surface(testing::ball(kBall_mm));
+  const Eigen::Vector3d at(3, 4, kBall_mm), elsewhere(0, -kBall_mm, 3);
+  std::vector<SeenPoint> rows(300, SeenPoint{at, 0.5, std::nullopt});
+  rows.push_back({at - Eigen::Vector3d(0, 0, 6), 0.5, std::nullopt});
+  rows.push_back({elsewhere, 0.01, std::nullopt});
+  const GatheredRows out = gathered_rows(rows, surface);
+  ASSERT_EQ(out.points.size(), 3U);
+  ASSERT_EQ(out.of_row.size(), rows.size());
+  for (std::size_t i = 1; i < 300; ++i) EXPECT_EQ(out.of_row[i], out.of_row[0]);
+  const SeenPoint& many = out.points[out.of_row[0]];
+  EXPECT_GE(many.sigma_mm, 0.15) << "no surer for being repeated";
+  EXPECT_LT((many.place_mm - at).norm(), 0.01);
+  EXPECT_NE(out.of_row[300], out.of_row[0]) << "6 mm off the others, at the same place";
+  const SeenPoint& alone = out.points[out.of_row[301]];
+  EXPECT_EQ(alone.place_mm, elsewhere) << "a row alone is as it is given";
+  EXPECT_EQ(alone.sigma_mm, 0.15);
+  for (const SeenPoint& point : out.points) EXPECT_GT(point.shift_mm, 0) << "what all rows have wrong together";
+}
+
+TEST(GatheredRows, AChainOfRowsThatAgreeEachWithTheNextIsNotOnePoint) {
+  const SeenSurface surface(testing::ball(kBall_mm));
+  std::vector<SeenPoint> rows;
+  for (int i = 0; i < 8; ++i) rows.push_back({Eigen::Vector3d(3, 4, kBall_mm - 8 + i), 0.5, std::nullopt});
+  const GatheredRows out = gathered_rows(rows, surface);
+  EXPECT_GE(out.points.size(), 2U);
+  EXPECT_NE(out.of_row.front(), out.of_row.back()) << "7 mm apart, of sigmas of 0.5 mm";
+  EXPECT_EQ(out.of_row[0], out.of_row[1]);
+}
+
 }  // namespace
 }  // namespace birdseye::host

@@ -89,5 +89,40 @@ TEST(FiducialJudgement, AScaleAlongOneAxisFailsAndTheAxisIsNamed) {
   EXPECT_FALSE(judged(kSound, 1.05, 1).along_axis) << "a scale of all axes is not one of one";
 }
 
+TEST(FiducialJudgement, SlicesAFifthAndMoreTooFarApartAreToldThoughNoScaleOfAllAxesFits) {
+  for (const double times : {1.2, 1.5, 2.0, 0.5}) {
+    Points ct_mm = kSound;
+    for (Eigen::Vector3d& place : ct_mm) place.z() *= times;
+    const FiducialJudgement out = judge_fiducial_points(ct_mm, touched(kSound, 1, 1), std::nullopt, {}, nullptr);
+    EXPECT_GT(out.shape.fre_rms_mm, times > 1.3 || times < 1 ? kLargestFre_mm : 2);
+    EXPECT_EQ(out.scale, Grade::fail) << times;
+    EXPECT_TRUE(out.along_axis) << times;
+    EXPECT_LT(out.axis_fre_rms_mm, 1) << times;
+  }
+  Points other_order = kSound;
+  std::swap(other_order[0], other_order[3]);
+  EXPECT_EQ(judge_fiducial_points(other_order, touched(kSound, 1, 1), std::nullopt, {}, nullptr).scale, Grade::pass)
+      << "no slices make that of another order";
+}
+
+TEST(FiducialJudgement, ResidualsRefuteAStatedErrorThatIsHalfOfTheirsAndBearOutASoundOne) {
+  constexpr int kTrials = 500;
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, 0.4);
+  int sound = 0, halved = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    // Six points leave 12 degrees of freedom.
+    double squares = 0;
+    for (int i = 0; i < 12; ++i) squares += std::pow(noise(random), 2);
+    const double fre_mm = std::sqrt(squares / 6), true_mm = 0.4 * std::sqrt(3.0);
+    sound += times_over_stated(fre_mm, 6, true_mm) ? 1 : 0;
+    halved += times_over_stated(fre_mm, 6, true_mm / 2) ? 1 : 0;
+  }
+  EXPECT_LE(sound, 3) << "1 in 1000";
+  EXPECT_GT(halved, 0.75 * kTrials);
+  EXPECT_NEAR(times_over_stated(1.42, 6, 0.1).value_or(0), 1.42 * std::sqrt(18 / 12.0) / 0.1, 0.01);
+  EXPECT_FALSE(times_over_stated(1.42, 6, 5)) << "larger than it is: nothing refutes that";
+}
+
 }  // namespace
 }  // namespace birdseye::host

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <random>
 
 namespace birdseye::host {
@@ -88,6 +90,30 @@ TEST(PointMatching, RefusesWhatDoesNotFitOneWayOnly) {
   // Two of the same triangle in the CT.
   expect({{0, 0, 0}, {90, 0, 0}, {0, 60, 0}, {0, 0, 200}, {90, 0, 200}, {0, 60, 200}},
          {{0, 0, 0}, {90, 0, 0}, {0, 60, 0}}, Errc::degenerate, "cannot be told apart");
+}
+
+TEST(PointMatching, OfAGivenOrderARivalIsToldWhereItFitsAsWellAndNotWhereResidualsTell) {
+  // A prism with a triangle at either end, the one turned against the other: a third of a turn changes no distance, and
+  // its mirror image does not fit.
+  std::vector<Eigen::Vector3d> prism;
+  for (const double end : {0.0, 0.5}) {
+    for (int k = 0; k < 3; ++k) {
+      const double angle = end + k * 2 * std::numbers::pi / 3;
+      prism.emplace_back(80 * std::cos(angle), 80 * std::sin(angle), end == 0 ? -60 : 60);
+    }
+  }
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 0.4);
+  std::vector<Eigen::Vector3d> touched = prism;
+  for (Eigen::Vector3d& p : touched) p += Eigen::Vector3d(noise(random), noise(random), noise(random));
+  const std::vector<Eigen::Vector3d> one_round{touched[1], touched[2], touched[0], touched[4], touched[5], touched[3]};
+  EXPECT_TRUE(rival_order_fre_mm(prism, touched));
+  EXPECT_TRUE(rival_order_fre_mm(prism, one_round)) << "it fits, and turns the patient by a third";
+  // With one marker 12 mm further out the given order is the only one, and the other is told by its rival.
+  prism[0] *= 1.12;
+  std::vector<Eigen::Vector3d> told = touched;
+  told[0] *= 1.12;
+  EXPECT_FALSE(rival_order_fre_mm(prism, told));
 }
 
 }  // namespace

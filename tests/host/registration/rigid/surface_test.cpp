@@ -129,7 +129,8 @@ TEST(SurfaceRefinement, BringsTheTargetNearer) {
     before += patient.target_error_mm(patient.fit.to_from) / kTrials;
     after += patient.target_error_mm(refined->patient_from_tracker) / kTrials;
     EXPECT_LT(refined->rms_after_mm, refined->accepted ? 0.45 : 100) << refined->told;
-    EXPECT_EQ(refined->kept, 180U);
+    EXPECT_EQ(refined->kept, std::ceil(0.9 * static_cast<double>(refined->places)));
+    EXPECT_GE(refined->places, 180U);
   }
   EXPECT_GE(accepted, kTrials - 1);  // one in a hundred is refused by chance
   EXPECT_LT(after, 0.35 * before) << before;
@@ -167,6 +168,42 @@ TEST(SurfaceRefinement, RefusesAnotherSurface) {
             Errc::degenerate);
   patient.scan[3].x() = NAN;
   EXPECT_EQ(refine_on_surface(surface, patient.scan, patient.anchor()).error().code, Errc::bad_value);
+}
+
+TEST(SurfaceRefinement, ACoordinateOutOfThisWorldIsSaidToBe) {
+  TouchedBody patient(3, 0.6, 0.3, 60);
+  patient.scan[7].x() = 2e9;
+  const auto refused = refine_on_surface(body(), patient.scan, patient.anchor());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::bad_value);
+  EXPECT_NE(refused.error().what.find("thousand kilometres"), std::string::npos) << refused.error().what;
+}
+
+TEST(SurfaceRefinement, OneTouchManyTimesIsNoSurfaceAndWeighsOnce) {
+  const Surface surface = body();
+  TouchedBody patient(3, 0.6, 0.3, 60);
+  const auto plain = refine_on_surface(surface, patient.scan, patient.anchor());
+  ASSERT_TRUE(plain) << plain.error().what;
+  const Points thirty(30, patient.scan[0]);
+  const auto one = refine_on_surface(surface, thirty, patient.anchor());
+  ASSERT_FALSE(one) << one->told;
+  EXPECT_EQ(one.error().code, Errc::degenerate);
+  EXPECT_NE(one.error().what.find("30 points on the surface (places 3 mm apart: 1): touch at least 10"),
+            std::string::npos)
+      << one.error().what;
+  // Held still at one place for ten times as many as all others together, pressed in, by a hand that trembles.
+  Points held = patient.scan;
+  std::mt19937 rng(4);
+  std::normal_distribution<double> tremble(0, 0.2);
+  const Eigen::Vector3d in = patient.truth.rotation() * Eigen::Vector3d(0, 1.5, 0);
+  for (int i = 0; i < 600; ++i)
+    held.emplace_back(patient.scan[0] + in + Eigen::Vector3d(tremble(rng), tremble(rng), tremble(rng)));
+  const auto weighed = refine_on_surface(surface, held, patient.anchor());
+  ASSERT_TRUE(weighed) << weighed.error().what;
+  EXPECT_EQ(weighed->points, 660U);
+  EXPECT_LE(weighed->places, plain->places + 2);
+  const Eigen::Vector3d target = patient.truth * Eigen::Vector3d(-30, 10, 5);
+  EXPECT_LT((weighed->surface_pose * target - plain->surface_pose * target).norm(), 0.2);
 }
 
 TEST(SurfaceFile, EveryFormatGivesTheSameTriangles) {
@@ -346,7 +383,7 @@ TEST(SurfaceRefinement, PelvisPhantomAsPublishedAndBeyond) {
   ASSERT_TRUE(refined) << refined.error().what;
   // The recording's own surface lies 8.5 mm beside its fiducials, in one direction: theirs moved them by 8.02 mm.
   EXPECT_FALSE(refined->accepted) << refined->told;
-  EXPECT_NEAR(refined->moved_mm, 8.57, 0.02);
+  EXPECT_NEAR(refined->moved_mm, 8.50, 0.02);
   EXPECT_NEAR(refined->allowed_mm, 1.25, 0.01);
   EXPECT_NEAR(refined->rms_before_mm, 5.62, 0.01);
   EXPECT_NEAR(refined->rms_after_mm, 0.36, 0.01);
@@ -363,10 +400,10 @@ TEST(SurfaceRefinement, PelvisPhantomAsPublishedAndBeyond) {
     ours_mm.push_back(index.nearest(refined->surface_pose * p).distance_mm);
     theirs_mm.push_back(index.nearest(published * p).distance_mm);
   }
-  // 1.3 mm and 0.2 deg from the published result, and nearer to the surface: half the points to 0.24 mm, where
+  // 1.3 mm and 0.3 deg from the published result, and nearer to the surface: half the points to 0.24 mm, where
   // that one has them to 0.85 mm.
-  EXPECT_NEAR(std::sqrt(apart2_mm2), 1.32, 0.02);
-  EXPECT_NEAR(rotation_angle_between(refined->surface_pose.rotation(), published.rotation()), 0.00375, 0.0001);
+  EXPECT_NEAR(std::sqrt(apart2_mm2), 1.29, 0.02);
+  EXPECT_NEAR(rotation_angle_between(refined->surface_pose.rotation(), published.rotation()), 0.0048, 0.0001);
   std::sort(ours_mm.begin(), ours_mm.end());
   std::sort(theirs_mm.begin(), theirs_mm.end());
   EXPECT_NEAR(ours_mm[1000], 0.237, 0.01);
