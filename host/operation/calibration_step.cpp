@@ -98,6 +98,7 @@ bool CalibrationStep::tick(const Instruments& now) {
     return false;
   }
   if (!finish(*guided)) return false;
+  taken_up_ = false;
   found_->found_with = begun_with_.link == now.link ? taken_over(now, begun_with_) : begun_with_;
   found_->record_scope = begun_scope_;
   found_->in_place_of_utc = record_utc_;
@@ -132,6 +133,7 @@ CalibrationStep::Adopted CalibrationStep::adopt(const calibration::CalibrationRe
   CalibratedScope adopted{*std::move(scope), made_utc, false, {record.tracker, record.camera}, record.scope};
   const bool anew = before && !is_same(*before, adopted);
   take(std::move(adopted), words("note_record_of", made_utc));
+  taken_up_ = false;
   former_.reset();
   return anew ? Adopted::anew : Adopted::again;
 }
@@ -152,6 +154,7 @@ bool CalibrationStep::take_up(const CalibratedScope& kept, const std::string& li
   }
   guide_.give_up();
   take(kept, line);
+  taken_up_ = true;
   return true;
 }
 

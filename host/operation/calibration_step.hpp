@@ -48,6 +48,8 @@ class CalibrationStep {
   [[nodiscard]] const std::optional<CalibratedScope>& rests_on() const {
     return found_ ? found_ : held_back_ ? held_back_ : former_;
   }
+  /// Found, or held back, and no earlier window's: this one's scope.
+  [[nodiscard]] bool is_of_this_window() const { return (found_ || held_back_) && !taken_up_; }
   /// It is held back because nothing tells what is connected: a person may say that it is the same.
   [[nodiscard]] bool person_may_say() const { return held_back_ && person_may_say_; }
   [[nodiscard]] const StepNote& note() const { return note_; }
@@ -73,7 +75,7 @@ class CalibrationStep {
   Instruments begun_with_;                 ///< the guide
   std::string begun_scope_;                ///< record_scope_ then
   std::string line_;                       ///< of what is held back, as it was found
-  bool person_may_say_ = false;
+  bool person_may_say_ = false, taken_up_ = false;
   StepNote note_;
   std::optional<Verdict> verdict_;
   GuideWorker guide_;

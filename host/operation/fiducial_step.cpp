@@ -17,16 +17,22 @@ constexpr std::size_t kFewestFiducials = 3;
 }  // namespace
 
 bool FiducialStep::add(const Touch& touch, std::size_t wanted, const Instruments& found_with) {
-  if (held_back_ || !confirmed_) {
+  // What was suspected stays so: each thing more that speaks against them would drop them again, and nobody could
+  // register.
+  const bool only_suspected = confirmed_ && begins_anew();
+  if (held_back_ || begins_anew()) {
+    dropped_ = touches_.size();
     touches_.clear();
     registered_.reset();
-    fit_is_due_ = held_back_ = false;
+    fit_is_due_ = held_back_ = touched_before_ = false;
     confirmed_ = true;
+  } else if (touches_.empty()) {
+    dropped_ = 0;
   }
   if (wanted != 0 && touches_.size() >= wanted && !may_add_) return false;
   if (touches_.empty()) {
     found_with_ = found_with;
-    suspected_ = false;
+    if (!only_suspected) suspected_ = false;
   }
   touches_.push_back({touch.tip_in_tracker_mm, touch.rms_mm, std::nullopt});
   return true;
@@ -49,7 +55,8 @@ void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& marker
   doubt_.clear();
   odd_.reset();
   for (TouchedFiducial& touch : touches_) touch.residual_mm.reset();
-  note_ = {false, words("note_touched", touches_.size())};
+  note_ = {false, dropped_ > 0 && !touches_.empty() ? words("note_touched_anew", touches_.size(), dropped_)
+                                                    : words("note_touched", touches_.size())};
   if (!markers_in_patient_mm || touches_.size() < kFewestFiducials) return;
   std::vector<Eigen::Vector3d> places;
   places.reserve(touches_.size());

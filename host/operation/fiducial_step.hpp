@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,7 +17,8 @@ namespace birdseye::host {
 class FiducialStep {
  public:
   /// One more; false: all that are wanted are touched (wanted 0: as many as come), and the fit asks for none. fit() is
-  /// due then. Where what was touched before is held back or in doubt, a new touch begins anew.
+  /// due then. Where what was touched before is held back, in doubt or suspected, a new touch begins anew: a fit is of
+  /// touches of one setup.
   /// found_with: by which it was touched.
   bool add(const Touch& touch, std::size_t wanted, const Instruments& found_with);
   /// One is taken back, from 0; false: there is none. fit() is due then.
@@ -38,8 +40,15 @@ class FiducialStep {
     suspected_ = false;
   }
   /// Something may have moved since the first touch, or since it was confirmed.
-  void suspect() { suspected_ = registered_ || !touches_.empty(); }
+  void suspect() {
+    if (!suspected_) touched_before_ = suspected_ = registered_ || !touches_.empty();
+  }
   [[nodiscard]] bool suspected() const { return suspected_; }
+  /// A touch would drop those before it, also where nothing is held back. Of before something spoke against them, they
+  /// may be of another setup, and a fit is of one.
+  [[nodiscard]] bool begins_anew() const {
+    return !confirmed_ || (suspected_ && touched_before_ && !held_back_ && !touches_.empty());
+  }
   /// Whether the registration holds is to be looked at anew; touches that gave none yet are dropped.
   void doubt();
   /// Holds back, touches and all, what was found with another tracker, and gives it back where that has come again.
@@ -71,6 +80,8 @@ class FiducialStep {
   Instruments found_with_;  ///< all touches, or what was taken up
   bool confirmed_ = true, suspected_ = false, held_back_ = false, person_may_say_ = false;
   std::string fault_, line_;                    ///< line_: of what is held back, as it was found
+  bool touched_before_ = false;                 ///< touches_ are of before it was suspected
+  std::size_t dropped_ = 0;                     ///< touches that the first of touches_ took the place of
   bool done_ = false;                           ///< and whether the step was done by it
   bool fit_is_due_ = false;                     ///< of touches that are held back
   bool fits_poorly_ = false, may_add_ = false;  ///< may_add_: one more than wanted, which the fit asks for

@@ -67,4 +67,12 @@ Result<void> check_figures(const DeformedOrgan& found) {
                            target.rms_mm, target.radius95_mm)};
 }
 
+Result<void> check_figures(const std::vector<NamedPoint>& landmarks) {
+  for (const NamedPoint& landmark : landmarks) {
+    if (!landmark.place_mm.allFinite() || landmark.place_mm.cwiseAbs().maxCoeff() > kFarthestMm)
+      return Error{Errc::bad_value, fmt::format("has a landmark farther than {:.0f} m away", kFarthestMm / 1000)};
+  }
+  return {};
+}
+
 }  // namespace birdseye::host

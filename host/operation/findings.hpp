@@ -31,6 +31,9 @@ struct CalibratedScope {
 /// By what was solved of stations over the board. Refuses, with the first reason, what the verdict fails.
 Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, const std::string& made_utc);
 
+/// Two places of the CT that are nearer are one: they were written down, or picked, twice.
+inline constexpr double kSamePlace_mm = 0.5;
+
 /// How far a place of the CT was off as the pointer was last held there.
 struct PlaceOff {
   Eigen::Vector3d in_ct_mm;  ///< of the CT as it was taken
@@ -49,6 +52,8 @@ struct RegisteredPatient {
   std::string made_utc{};
   std::string doubt{};  ///< what cannot be told by these touches; empty: nothing
   std::vector<PlaceOff> off{};
+  /// The tip, as somebody last touched or checked with it. Empty: nobody kept it.
+  std::optional<Eigen::Vector3d> tip_in_pointer_mm{};
 };
 
 /// How the organ is deformed, and how well that is known; what was not estimated is absent.

@@ -18,7 +18,6 @@ CheckReading check_by_landmarks(const Eigen::Vector3d& tip_in_tracker_mm, const 
                                 const DeformedOrgan* deformed) {
   CheckReading reading;
   reading.tip_in_patient_mm = registered.tracker_from_patient.inverse() * tip_in_tracker_mm;
-  constexpr double kSamePlace_mm = 0.5;
   const auto consider = [&](const std::string& name, const Eigen::Vector3d& place_mm) {
     const double distance_mm = (as_shown_mm(place_mm, deformed) - reading.tip_in_patient_mm).norm();
     if (!reading.nearest.empty() && distance_mm >= reading.distance_mm) return;

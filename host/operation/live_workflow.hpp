@@ -2,7 +2,9 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "host/link/event_stream.hpp"
 #include "host/operation/calibration_step.hpp"
@@ -144,6 +146,7 @@ class LiveWorkflow {
   [[nodiscard]] bool asks_for_patient() const;
   [[nodiscard]] bool is_other_patients() const;
   void forget_views(const std::string& why);
+  void forget_views_of_before();
   void show_shape();
   void show_margins();
   void update_setup();
@@ -165,6 +168,16 @@ class LiveWorkflow {
   void watch_motion(const wire::VideoFrame& frame);
   void take_up();
   void keep();
+  /// Of the pointer; empty: nobody has said where it is.
+  [[nodiscard]] const std::optional<Eigen::Vector3d>& tip_in_pointer_mm() const {
+    return settings_.tip_in_pointer_mm ? settings_.tip_in_pointer_mm : record_tip_in_pointer_mm_;
+  }
+  void note_tip();
+  void note_field(const std::string& unsigned_why);
+  void add_touch(const Touch& touch);
+  /// That may tell whether the registration holds: in doubt, those that were known before.
+  [[nodiscard]] std::span<const NamedPoint> landmarks_that_count() const;
+  [[nodiscard]] std::vector<NamedPoint> picked_landmarks() const;
 
   LiveSettings settings_;
   LiveStep step_ = LiveStep::connect;
@@ -172,10 +185,11 @@ class LiveWorkflow {
   bool frozen_ = false, patient_confirmed_ = false;
   bool simulated_ = false;              ///< nobody lies there
   std::optional<HostTime> video_came_;  ///< the newest frame
-  std::optional<HostTime> scope_came_;  ///< the scope's newest pose, or later where the patient was touched since
-  std::optional<Duration> asleep_;      ///< how long this machine has slept, as it was last told
-  std::optional<HostTime> watched_;     ///< the newest frame by which it was watched that video and poses agree
-  bool guided_ = false;                 ///< the scope was being calibrated over the board then
+  /// From when on the scope is missed: its newest pose, or later where the patient was touched since.
+  std::optional<HostTime> scope_away_since_;
+  std::optional<Duration> asleep_;   ///< how long this machine has slept, as it was last told
+  std::optional<HostTime> watched_;  ///< the newest frame by which it was watched that video and poses agree
+  bool guided_ = false;              ///< the scope was being calibrated over the board then
   ConnectedInstruments instruments_;
   PictureHardware taken_with_;
   ReferenceSensor reference_;
@@ -187,6 +201,8 @@ class LiveWorkflow {
   std::string record_doubt_, operation_doubt_;
   /// Of the map by which the appliance corrects poses. Once told it stays: what was found by such poses rests on it.
   std::string field_doubt_;
+  std::optional<std::string> field_told_;           ///< of that map, as it was told last by this tracker's appliance
+  std::optional<Eigen::Vector3d> touched_with_mm_;  ///< the tip, as somebody last touched or checked with it
   std::uint64_t shapes_ = 0;
 
   ConnectionStep connection_;

@@ -44,7 +44,7 @@ void LiveWorkflow::note_pause(HostTime now, std::optional<HostTime>& came, bool 
 
 /// Somebody has just seen where the patient lies: how long the scope was away before counts no more.
 void LiveWorkflow::note_looked_at() {
-  scope_came_ = heard_ + (kToBringScope - kPause);
+  scope_away_since_ = heard_ + (kToBringScope - kPause);
 }
 
 /// CLOCK_MONOTONIC stands still in a machine that sleeps, and so no pause is seen.
@@ -68,12 +68,21 @@ void LiveWorkflow::doubt_registration(const std::string& why) {
   pointer_ = {};  // where it was before tells nothing of what has moved since
   fits_at_mm_.reset();
   strokes_.end();
+  forget_views_of_before();
   if (!fiducials_.registered_or_held_back()) return follow_held_back();
   run_ = {};
   checked_.reset();
   check_ = {false, why};
   (return_to_ ? *return_to_ : step_) = LiveStep::check;
   update_setup();
+}
+
+/// Those of before would be matched with later ones as if nothing had moved between them, also where two landmarks fit
+/// to some millimetres. A deformation by views of one setup is checked by these landmarks, and stays.
+void LiveWorkflow::forget_views_of_before() {
+  if (views_.views().empty() && strokes_.places() == 0) return;
+  views_.forget(words("note_views_doubted"));
+  strokes_.forget();
 }
 
 /// The newest frame, if it is time for another check. Of a motion that is known the check goes on: it may pass.
@@ -102,6 +111,7 @@ void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
   if (!settings_.video_must_agree) return;
   // What has moved was the scope on its sensor, or patient or transmitter: of these only a landmark tells.
   if (news.contradicted) doubt_registration(words("why_video_differs"));
+  if (news.again) forget_views_of_before();
   // To ask at each picture would let nobody register. Once they agree it tells whether it is done since.
   if (news.again && !fiducials_.suspected()) {
     note_landmarks();
@@ -195,6 +205,7 @@ void LiveWorkflow::note_off(const CheckReading& reading, bool refuses) {
   keep();
 }
 
+/// A landmark that is off says nothing of what has moved between the kept views: these stay until it is touched anew.
 void LiveWorkflow::refuse_registration(const CheckReading& by) {
   why_doubted_ = words("note_check_off", by.distance_mm, by.nearest);
   check_ = {false, why_doubted_};
@@ -215,7 +226,9 @@ void LiveWorkflow::confirm_registration(const std::optional<CheckReading>& by) {
   fits_at_mm_.reset();
   why_doubted_.clear();
   if (by) note_looked_at();
+  if (by) touched_with_mm_ = tip_in_pointer_mm();
   update_setup();
+  keep();  // landmarks that were picked in doubt count from now on
   go_to(LiveStep::run);
 }
 

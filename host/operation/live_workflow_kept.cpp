@@ -1,5 +1,8 @@
 // What others have found and wrote: the appliance's record, an earlier window's operation; and what is kept for the
 // next.
+#include <algorithm>
+#include <cstddef>
+
 #include "calibration/record/sha256.hpp"
 #include "host/files/record_file.hpp"
 #include "host/operation/live_workflow.hpp"
@@ -27,14 +30,39 @@ void LiveWorkflow::take(const wire::Calibration& calibration) {
     record_tip_in_pointer_mm_ = record->tip->tip_in_sensor_mm;
     if (!settings_.tip_in_pointer_mm) tip_rms_mm_ = record->tip->rms_mm;
   }
+  const bool was_of_this_window = calibration_.is_of_this_window();
   const auto adopted = calibration_.adopt(*record);
-  if (adopted == CalibrationStep::Adopted::no) return;
+  if (adopted == CalibrationStep::Adopted::no) return note_tip();
   if (adopted == CalibrationStep::Adopted::anew) {
     const bool deformed = deformation_.found() != nullptr;
+    // As it was read off another scope's rod. Before this window had any it was said of the first to come.
+    if (was_of_this_window) settings_.rod_angle_deg.reset();
     forget_views(words("note_calibrated_anew"));
     if (deformed) keep();
   }
+  note_tip();
   follow_held_back();
+}
+
+/// By another tip the fiducials would have been touched elsewhere: whether the registration holds a look tells. So
+/// would strokes, and what was matched with them.
+void LiveWorkflow::note_tip() {
+  const auto& tip_mm = tip_in_pointer_mm();
+  // What is held back may come back with the pointer that it was touched with.
+  if (fiducials_.held_back() || !tip_mm || !touched_with_mm_ || *tip_mm == *touched_with_mm_) return;
+  touched_with_mm_ = tip_mm;
+  const bool deformed = deformation_.found() != nullptr;
+  forget_views(words("note_views_other_tip"));
+  doubt_registration(words("why_other_tip"));
+  if (deformed) keep();
+}
+
+/// Of the map by which the appliance corrects poses nothing else is told: where one that nobody known signed comes or
+/// goes, it is another, and so is the tracker's frame.
+void LiveWorkflow::note_field(const std::string& unsigned_why) {
+  const bool another = field_told_ && *field_told_ != unsigned_why;
+  field_told_ = unsigned_why;
+  if (another) doubt_registration(words("why_other_field"));
 }
 
 void LiveWorkflow::keep() {
@@ -46,13 +74,25 @@ void LiveWorkflow::keep() {
   operation.record_sha256 = record_sha256_;
   operation.calibrated = calibration_.rests_on();
   operation.registered = fiducials_.registered_or_held_back();
-  if (operation.registered) operation.registered->off = off_.all();
+  if (operation.registered) {
+    operation.registered->off = off_.all();
+    operation.registered->tip_in_pointer_mm = touched_with_mm_;
+  }
   operation.deformed = deformation_.found();
+  operation.landmarks = picked_landmarks();
   // What the next window finds in it rests on the same.
   for (const std::string* doubt : {&record_doubt_, &operation_doubt_, &settings_.recording_doubt, &field_doubt_}) {
     if (operation.doubt.empty()) operation.doubt = *doubt;
   }
   keeper_.keep(std::move(operation));
+}
+
+/// But for those that were picked since the registration came into doubt: the next window would take them for known
+/// before it.
+std::vector<NamedPoint> LiveWorkflow::picked_landmarks() const {
+  const auto known = landmarks_that_count();
+  const std::size_t of_plan = std::min(known.size(), patient_.plan()->landmarks.size());
+  return {known.begin() + static_cast<std::ptrdiff_t>(of_plan), known.end()};
 }
 
 void LiveWorkflow::take_up() {
@@ -65,6 +105,7 @@ void LiveWorkflow::take_up() {
   const auto& kept = *operation;
   if (!kept) return;
   operation_doubt_ = kept->doubt;
+  for (const NamedPoint& landmark : kept->landmarks) patient_.add_landmark(landmark);
   landmarks_before_doubt_ = patient_.landmarks().size();
   const std::string when = words("note_taken_up", kept->made_utc);
   if (record_sha256_.empty()) record_sha256_ = kept->record_sha256;
@@ -79,7 +120,10 @@ void LiveWorkflow::take_up() {
   } else if (kept->deformed) {
     views_.forget(is_known ? words("note_calibrated_anew") : words("note_deformed_unknown"));
   }
-  if (taken_up && kept->registered) off_.take_up(kept->registered->off);
+  if (taken_up && kept->registered) {
+    off_.take_up(kept->registered->off);
+    touched_with_mm_ = kept->registered->tip_in_pointer_mm;
+  }
   if (!deformation_.found()) off_.forget_deformed();
   judge_instruments();
   update_setup();

@@ -45,6 +45,7 @@ void LiveWorkflow::take(const PlacePicks::Picked& picked) {
         words("landmark_name", patient_.landmarks().size() - patient_.plan()->landmarks.size() + 1);
     const Eigen::Vector3d place_mm = marker ? marker->centre_in_patient_mm : picked.pointed_mm;
     patient_.add_landmark({name, place_mm});
+    keep();
     const double off_mm = (place_mm - picked.pointed_mm).norm();
     pick_line_ = marker ? words("picked_landmark_marker", name, name_of(marker->kind), off_mm)
                         : words("picked_landmark", name, place_mm.x(), place_mm.y(), place_mm.z());

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 #include "host/operation/landmark_check.hpp"
 #include "host/texts/texts.hpp"
 
@@ -25,7 +27,7 @@ std::string LiveWorkflow::why_primary_refused() const {
   std::string no_setup = picture_.why_no_setup();
   switch (step_) {
     case LiveStep::fiducials:
-      if (fiducials_.note().done && fiducials_.confirmed()) return {};
+      if (fiducials_.note().done && !fiducials_.begins_anew()) return {};
       if (simulated_) return words("touch_simulated");
       return pointer_held() ? std::string() : words("why_no_pointer");
     case LiveStep::views:
@@ -102,8 +104,9 @@ OperationView LiveWorkflow::view() const {
   out.deformed_with_care = deformation_.with_care();
   out.watched = out.deformed != nullptr && watch_.watches();
   out.organ_moved = motion_.moved_mm().has_value();
-  out.surface_told = out.watched && motion_.told();
-  if (out.deformed) out.surface_check = watch_.watches() ? motion_.line() : words("note_not_watched");
+  out.surface_told = out.watched && motion_.told(heard_);
+  out.surface_unchecked = out.watched && motion_.unchecked();
+  if (out.deformed) out.surface_check = watch_.watches() ? motion_.line(heard_) : words("note_not_watched");
   out.patient = patient_.plan();
   out.patient_confirmed = patient_confirmed_;
   out.patient_files = patient_.files();
@@ -137,17 +140,20 @@ bool LiveWorkflow::pointer_is_seen() const {
   return pointer_was_ && heard_ - *pointer_was_ < kPointerIsSeen;
 }
 
-/// In doubt only places count that were known before: one that is picked where the tip is shown proves nothing.
+/// One that is picked where the tip is shown proves nothing.
+std::span<const NamedPoint> LiveWorkflow::landmarks_that_count() const {
+  const std::span<const NamedPoint> all = patient_.landmarks();
+  const bool doubted = !fiducials_.confirmed() || fiducials_.suspected();
+  return doubted ? all.first(std::min(all.size(), landmarks_before_doubt_)) : all;
+}
+
 std::optional<CheckReading> LiveWorkflow::check_reading() const {
   const auto tip_mm = pointer_is_seen() ? pointer_.in_tracker_mm() : std::nullopt;
   const auto registered = fiducials_.registered();
   if (!tip_mm || !registered || !patient_.plan()) return std::nullopt;
   const auto& markers = patient_.markers_in_patient_mm();
-  std::span<const NamedPoint> landmarks = patient_.landmarks();
-  if (!fiducials_.confirmed() || fiducials_.suspected())
-    landmarks = landmarks.first(std::min(landmarks.size(), landmarks_before_doubt_));
-  return check_by_landmarks(*tip_mm, *registered, landmarks, markers ? *markers : registered->fiducials_in_patient_mm,
-                            deformation_.found().get());
+  return check_by_landmarks(*tip_mm, *registered, landmarks_that_count(),
+                            markers ? *markers : registered->fiducials_in_patient_mm, deformation_.found().get());
 }
 
 std::optional<ImageRgba> LiveWorkflow::ct_seen_from(const CameraModel& camera,

@@ -66,6 +66,7 @@ std::string sheet_text(const Operation& operation, const ThisMachine& machine) {
   if (operation.calibrated) parts.emplace_back("calibrated", json_of(*operation.calibrated));
   if (operation.registered) parts.emplace_back("registered", json_of(*operation.registered));
   if (operation.deformed) parts.emplace_back("deformed", json_of(*operation.deformed));
+  if (!operation.landmarks.empty()) parts.emplace_back("landmarks", json_of(operation.landmarks));
   if (!operation.doubt.empty()) parts.push_back({"rests_on", {{"unsigned", operation.doubt}}});
   return sealed_text(parts, kOperationFormat, machine);
 }
@@ -165,6 +166,11 @@ Result<Operation> operation_of(const nlohmann::json& sheet) {
     if (!found) return found.error().with_context("deformed");
     out.deformed = std::make_shared<const DeformedOrgan>(*std::move(found));
   }
+  if (sheet.contains("landmarks")) {
+    auto picked = landmarks_of(sheet.at("landmarks"));
+    if (!picked) return picked.error().with_context("landmarks");
+    out.landmarks = *std::move(picked);
+  }
   if (sheet.contains("rests_on")) sheet.at("rests_on").at("unsigned").get_to(out.doubt);
   return out;
 }
@@ -257,10 +263,9 @@ Result<void> check_patient(const Operation& operation, const std::string& ct_sha
 }
 
 Result<void> check_target(const Operation& operation, const Eigen::Vector3d& target_at_rest_mm) {
-  constexpr double kSame_mm = 0.5;
   if (!operation.deformed || !operation.deformed->target_at_rest_mm) return {};
   const Eigen::Vector3d& then_mm = *operation.deformed->target_at_rest_mm;
-  if ((then_mm - target_at_rest_mm).norm() <= kSame_mm) return {};
+  if ((then_mm - target_at_rest_mm).norm() <= kSamePlace_mm) return {};
   return Error{Errc::bad_value,
                fmt::format("says how far the target at {:.1f} {:.1f} {:.1f} may be off, and the target "
                            "is another now; give the same --landmarks or --targets",

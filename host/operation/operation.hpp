@@ -5,10 +5,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "host/files/authors.hpp"
 #include "host/files/sealed_text.hpp"
 #include "host/operation/findings.hpp"
+#include "host/operation/patient.hpp"
 #include "host/volume/volume_source.hpp"
 
 namespace birdseye::host {
@@ -27,6 +29,8 @@ struct Operation {
   /// What of it rests on files that no known machine signed, or that it is itself such a file, in words; empty:
   /// nothing.
   std::string doubt = {};
+  /// That a person picked in the CT, and that may tell whether a registration holds; in the CT as it was taken.
+  std::vector<NamedPoint> landmarks = {};
 };
 
 /// operation.json holds all of it, sealed and signed by this machine: not one bit of it may change. It is written

@@ -60,6 +60,14 @@ void enter(Json& json, const char* name, const std::optional<double>& figure) {
   if (figure) json[name] = *figure;
 }
 
+Json numbers_of(const Eigen::Vector3d& place_mm) {
+  return {place_mm.x(), place_mm.y(), place_mm.z()};
+}
+
+Eigen::Vector3d place_of(const Json& json) {
+  return Eigen::Vector3d(json.get<std::array<double, 3>>().data());
+}
+
 Instruments instruments_of(const Json& json) {
   Instruments out;
   json.at("tracker").get_to(out.tracker);
@@ -107,15 +115,23 @@ Json json_of(const RegisteredPatient& found) {
             {"fiducials_in_patient_mm", Json::array()}};
   if (!found.found_with.reference.empty()) json["reference"] = found.found_with.reference;
   if (!found.doubt.empty()) json["doubt"] = found.doubt;
+  if (const auto& tip_mm = found.tip_in_pointer_mm) json["tip_in_pointer_mm"] = numbers_of(*tip_mm);
   for (const PlaceOff& place : found.off) {
     json["off"].push_back({{"name", place.name},
-                           {"in_ct_mm", {place.in_ct_mm.x(), place.in_ct_mm.y(), place.in_ct_mm.z()}},
+                           {"in_ct_mm", numbers_of(place.in_ct_mm)},
                            {"off_mm", place.off_mm},
                            {"deformed", place.deformed},
                            {"refuses", place.refuses}});
   }
   for (const Eigen::Vector3d& place : found.fiducials_in_patient_mm)
-    json["fiducials_in_patient_mm"].push_back({place.x(), place.y(), place.z()});
+    json["fiducials_in_patient_mm"].push_back(numbers_of(place));
+  return json;
+}
+
+Json json_of(const std::vector<NamedPoint>& picked) {
+  Json json{{"picked", Json::array()}};
+  for (const NamedPoint& landmark : picked)
+    json["picked"].push_back({{"name", landmark.name}, {"in_ct_mm", numbers_of(landmark.place_mm)}});
   return json;
 }
 
@@ -134,7 +150,7 @@ Json json_of(const DeformedOrgan& found) {
   if (!found.care.empty()) json["with_care"] = found.care;
   if (found.target) json["target"] = {{"rms_mm", found.target->rms_mm}, {"radius95_mm", found.target->radius95_mm}};
   if (const auto& at_mm = found.target_at_rest_mm; found.target && at_mm)
-    json["target"]["at_rest_mm"] = {at_mm->x(), at_mm->y(), at_mm->z()};
+    json["target"]["at_rest_mm"] = numbers_of(*at_mm);
   return json;
 }
 
@@ -182,14 +198,20 @@ Result<RegisteredPatient> registered_of(const Json& json) {
     out.fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
                                              place.at(2).get<double>());
   out.doubt = json.value("doubt", "");
+  if (json.contains("tip_in_pointer_mm")) out.tip_in_pointer_mm = place_of(json.at("tip_in_pointer_mm"));
   for (const Json& place : json.value("off", Json::array())) {
-    const auto in_ct_mm = place.at("in_ct_mm").get<std::array<double, 3>>();
-    out.off.push_back({{in_ct_mm[0], in_ct_mm[1], in_ct_mm[2]},
-                       place.at("name").get<std::string>(),
-                       place.at("off_mm").get<double>(),
-                       place.at("deformed").get<bool>(),
+    out.off.push_back({place_of(place.at("in_ct_mm")), place.at("name").get<std::string>(),
+                       place.at("off_mm").get<double>(), place.at("deformed").get<bool>(),
                        place.at("refuses").get<bool>()});
   }
+  if (auto sound = check_figures(out); !sound) return sound.error();
+  return out;
+}
+
+Result<std::vector<NamedPoint>> landmarks_of(const Json& json) {
+  std::vector<NamedPoint> out;
+  for (const Json& landmark : json.at("picked"))
+    out.push_back({landmark.at("name").get<std::string>(), place_of(landmark.at("in_ct_mm"))});
   if (auto sound = check_figures(out); !sound) return sound.error();
   return out;
 }
@@ -218,10 +240,7 @@ Result<DeformedOrgan> deformed_of(const Json& json) {
   if (json.contains("target")) {
     const Json& target = json.at("target");
     out.target = {target.at("rms_mm").get<double>(), target.at("radius95_mm").get<double>()};
-    if (target.contains("at_rest_mm")) {
-      const auto at_mm = target.at("at_rest_mm").get<std::array<double, 3>>();
-      out.target_at_rest_mm = {at_mm[0], at_mm[1], at_mm[2]};
-    }
+    if (target.contains("at_rest_mm")) out.target_at_rest_mm = place_of(target.at("at_rest_mm"));
   }
   if (auto sound = check_figures(out); !sound) return sound.error();
   return out;

@@ -39,7 +39,8 @@ struct OperationView {
   bool looking_for_marker = false;  ///< where a person has pointed at the CT
   bool fits_poorly = false;         ///< the touches, to the markers
   bool deformed_with_care = false;  ///< its step's note says why
-  bool surface_told = false;        ///< by figures: the last check could tell
+  bool surface_told = false;        ///< a check of the last ten seconds could tell whether the organ has moved
+  bool surface_unchecked = false;   ///< it is watched, and nothing was found yet since it was matched
   bool asks_for_patient = false;    ///< and waits for it before anything is registered
   std::string not_signed;           ///< what is used that no known machine signed; empty: nothing
   bool patient_confirmed = false;   ///< a person has compared name, ID and date with the patient on the table

@@ -93,8 +93,10 @@ std::optional<std::size_t> PatientStep::drop_marker(const Eigen::Vector3d& place
   return which;
 }
 
-void PatientStep::undo_landmark() {
-  if (plan_ && landmarks_.size() > plan_->landmarks.size()) landmarks_.pop_back();
+bool PatientStep::undo_landmark() {
+  if (!plan_ || landmarks_.size() <= plan_->landmarks.size()) return false;
+  landmarks_.pop_back();
+  return true;
 }
 
 bool PatientStep::use(const Loaded& loaded) {

@@ -53,7 +53,7 @@ class PatientStep {
   [[nodiscard]] const std::vector<NamedPoint>& landmarks() const { return landmarks_; }
   void add_landmark(NamedPoint landmark) { landmarks_.push_back(std::move(landmark)); }
   /// Takes the last one back that a person has picked.
-  void undo_landmark();
+  bool undo_landmark();
   /// Draws what is shown of the plan, which it holds. Null: there is none yet.
   [[nodiscard]] const std::shared_ptr<Engine>& engine() const { return engine_; }
   /// Null where the name that was given is none.

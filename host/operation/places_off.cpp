@@ -8,8 +8,7 @@ namespace birdseye::host {
 namespace {
 
 bool is_same(const Eigen::Vector3d& one_mm, const Eigen::Vector3d& other_mm) {
-  constexpr double kSame_mm = 0.5;
-  return (one_mm - other_mm).norm() < kSame_mm;
+  return (one_mm - other_mm).norm() < kSamePlace_mm;
 }
 
 }  // namespace
@@ -18,11 +17,21 @@ void PlacesOff::note(PlaceOff place) {
   std::erase_if(places_, [&](const PlaceOff& other) {
     return other.deformed == place.deformed && is_same(other.in_ct_mm, place.in_ct_mm);
   });
+  for (PlaceOff& other : places_)
+    if (is_same(other.in_ct_mm, place.in_ct_mm)) other.refuses = false;  // how it is now was just seen
   places_.push_back(std::move(place));
 }
 
+void PlacesOff::forget_but_refusing() {
+  std::erase_if(places_, [](const PlaceOff& place) { return !place.refuses; });
+}
+
 void PlacesOff::forget_deformed() {
-  std::erase_if(places_, [](const PlaceOff& place) { return place.deformed; });
+  for (PlaceOff& place : std::exchange(places_, {})) {
+    if (place.deformed && !place.refuses) continue;
+    place.deformed = false;
+    note(std::move(place));
+  }
 }
 
 void PlacesOff::forget_at(const Eigen::Vector3d& place_in_ct_mm) {

@@ -12,11 +12,14 @@ namespace birdseye::host {
 /// of the deformed one are two: either may be off where the other is not.
 class PlacesOff {
  public:
-  /// In place of what was noted of the same place.
+  /// In place of what was noted of the same place. Whether it refuses counts of the CT as it was taken and of the
+  /// deformed one alike.
   void note(PlaceOff place);
   /// Of another registration nothing of it is known.
   void forget() { places_.clear(); }
-  /// The deformation is another, or none.
+  /// The same touches were fitted otherwise: landmarks that were off still speak against them.
+  void forget_but_refusing();
+  /// The deformation is another, or none. A landmark that was off by it still speaks against the registration.
   void forget_deformed();
   /// Somebody says that there is nothing at this place of the CT.
   void forget_at(const Eigen::Vector3d& place_in_ct_mm);

@@ -107,7 +107,6 @@ void VideoMotion::reset() {
   key_.reset();
   looked_at_.reset();
   told_ = {};
-  wanted_ = 1;
   odd_ = 0;
   state_ = VideoAgreement::untold;
   off_px_.reset();
@@ -156,7 +155,10 @@ bool VideoMotion::take(const wire::VideoFrame& frame, const PictureToFollow& pic
                        double farthest_mm) {
   const VideoAgreement before = state_;
   contradicted_ = false;
-  if (of_ && !of_->sees_as(scope)) reset();
+  if (of_ && !of_->sees_as(scope)) {
+    reset();
+    wanted_ = 1;  // another scope had differed, or its rod was turned since; a clock that goes back leaves this one's
+  }
   of_ = scope;
   const DeviceTime at = frame.info.acquired;
   if (waiting_) {

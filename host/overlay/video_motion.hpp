@@ -79,8 +79,8 @@ class VideoMotion {
   std::unique_ptr<Waiting> waiting_;  ///< the newest picture that is looked at, until the poses after it have come
   std::unique_ptr<Key> key_;          ///< the picture in which the places that are followed were chosen
   std::array<int, 3> told_{};         ///< how often it agreed, by axis of the camera
-  int wanted_ = 1;                    ///< so often about each; twice as often each time that it has differed
-  int odd_ = 0;                       ///< pictures in a row that do not agree
+  int wanted_ = 1;  ///< so often about each; of this scope twice as often each time that it has differed
+  int odd_ = 0;     ///< pictures in a row that do not agree
   bool contradicted_ = false;
   VideoAgreement state_ = VideoAgreement::untold;
   std::optional<double> off_px_;

@@ -14,6 +14,8 @@ Banner whole_overlay(const OperationView& operation, const OverlayLook& look) {
   if (look.render.clip) return {words("banner_cut", error)};
   if (!operation.deformed) return {words("banner_unmatched", error)};
   if (!operation.watched) return {words("banner_unwatched", error)};
+  if (operation.surface_unchecked) return {words("banner_surface_unchecked", error)};
+  if (!operation.surface_told) return {words("banner_surface_untold", error)};
   if (!operation.checked) return {words("banner_unchecked", error)};
   return {words("banner_checked", operation.checked->off_mm, operation.checked->name, error), Grade::pass};
 }
@@ -41,6 +43,19 @@ Banner banner_of(const OperationView& operation, const ShownPicture& shown, cons
   if (facts.recorded) banner.text = words("banner_recording", banner.text);
   if (operation.simulated) banner.text = words("banner_simulated", banner.text);
   return banner;
+}
+
+WatchLine watch_line_of(const OperationView& operation) {
+  const bool referenced = !operation.reference.empty();
+  const std::string reference =
+      referenced ? words("watch_reference", operation.reference) : words("watch_no_reference");
+  const std::string organ = !operation.watched            ? words("watch_no_organ")
+                            : operation.organ_moved       ? words("watch_organ_moved")
+                            : operation.surface_unchecked ? words("watch_organ_unchecked")
+                            : !operation.surface_told     ? words("watch_organ_untold")
+                                                          : words("watch_organ");
+  const bool organ_holds = operation.watched && operation.surface_told && !operation.organ_moved;
+  return {words("watch", reference, organ), referenced && organ_holds};
 }
 
 }  // namespace birdseye::host

@@ -19,4 +19,12 @@ struct Banner {
 
 Banner banner_of(const OperationView& operation, const ShownPicture& shown, const PanelFacts& facts);
 
+/// What watches whether patient, transmitter and organ move. good: all of it does, and could tell lately that nothing
+/// has.
+struct WatchLine {
+  std::string text;
+  bool good = false;
+};
+WatchLine watch_line_of(const OperationView& operation);
+
 }  // namespace birdseye::host

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "host/texts/texts.hpp"
+#include "host/window/banner.hpp"
 #include "host/window/line_breaks.hpp"
 #include "host/window/panel_context.hpp"
 
@@ -122,11 +123,9 @@ void draw_watch(const PanelContext& context) {
   const OperationView& operation = context.operation;
   const bool runs = operation.step == LiveStep::run && operation.fre_mm && !operation.unconfirmed;
   if (context.shown.stale || (!context.shown.overlaid && !runs)) return;
-  const bool seen = !operation.reference.empty(), all = seen && operation.watched;
-  const std::string reference = seen ? words("watch_reference", operation.reference) : words("watch_no_reference");
-  const std::string organ = operation.watched ? words("watch_organ") : words("watch_no_organ");
-  say(all ? context.theme.good : context.theme.warn,
-      fmt::format("{} {}", all ? kGoodSign : kWarnSign, words("watch", reference, organ)));
+  const WatchLine line = watch_line_of(operation);
+  say(line.good ? context.theme.good : context.theme.warn,
+      fmt::format("{} {}", line.good ? kGoodSign : kWarnSign, line.text));
 }
 
 /// What may be left out, last: half a line at the window's edge is none.

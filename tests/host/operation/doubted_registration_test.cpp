@@ -3,8 +3,7 @@
 
 #include <array>
 
-#include "drivers/system/wait.hpp"
-#include "tests/support/live_operation.hpp"
+#include "tests/host/operation/doubted_fixture.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -14,45 +13,6 @@ using birdseye::testing::confirm;
 using birdseye::testing::Hand;
 using birdseye::testing::kFiducials;
 using birdseye::testing::kTumour;
-using birdseye::testing::Scratch;
-
-/// Registered, and before the check.
-class Doubted : public ::testing::Test {
- protected:
-  void SetUp() override {
-    birdseye::testing::load(workflow_);
-    birdseye::testing::connect_and_calibrate(workflow_);
-    Hand hand(workflow_);
-    for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
-    hand.rest_at({0, 0, 200}, 1);
-    workflow_.go_to(LiveStep::check);
-    ASSERT_TRUE(drawn());
-  }
-  /// Without video for a while nobody knows what was moved.
-  void pause(std::int64_t until_ms = 20'000) {
-    wire::VideoFrame frame;
-    for (const std::int64_t ms : {until_ms - 20'000, until_ms}) {
-      frame.info.acquired = DeviceTime{ms * birdseye::testing::kMs};
-      workflow_.take(frame, HostTime{frame.info.acquired.ns}, ClockGap{});
-    }
-    ASSERT_FALSE(drawn());
-    ASSERT_EQ(workflow_.view().step, LiveStep::check);
-  }
-  void pick_landmark(const Eigen::Vector3d& place_mm) {
-    const std::size_t before = workflow_.view().landmarks.size();
-    workflow_.pick(PlacePicks::Kind::landmark, place_mm);
-    for (int i = 0; i < 1000 && workflow_.view().landmarks.size() == before; ++i) {
-      sleep_for(Duration::from_ms(10));
-      workflow_.tick();
-    }
-    ASSERT_EQ(workflow_.view().landmarks.size(), before + 1);
-  }
-  bool drawn() { return workflow_.picture().setup().has_value(); }
-  std::string said() { return workflow_.view().note(LiveStep::check).line; }
-
-  const Scratch scratch_;
-  LiveWorkflow workflow_{birdseye::testing::operation_settings(scratch_)};
-};
 
 TEST_F(Doubted, IsNotConfirmedByWhatThePointerDidBefore) {
   Hand(workflow_).rest_at(kTumour, 5);
@@ -423,6 +383,20 @@ TEST_F(Doubted, IsNotARegistrationOfWhichNobodyLooked) {
   EXPECT_TRUE(drawn());
   EXPECT_EQ(workflow_.view().step, LiveStep::run);
   EXPECT_EQ(said(), "gone on without a landmark");
+}
+
+/// Without the deformation, or with another, nobody has looked whether the landmark fits.
+TEST(PlacesOff, ALandmarkThatRefusesStillDoesWhereTheDeformationGoes) {
+  PlacesOff off;
+  off.note({kTumour, "tumour", 12, true, true});
+  off.note({kFiducials[0], "fiducial 1", 3, true, false});
+  off.forget_but_refusing();
+  off.forget_deformed();
+  ASSERT_EQ(off.all().size(), 1U);
+  ASSERT_NE(off.refusing(), nullptr);
+  EXPECT_FALSE(off.refusing()->deformed);
+  off.note({kTumour, "tumour", 1, true, false});
+  EXPECT_EQ(off.refusing(), nullptr) << "it fits, by whichever CT";
 }
 
 }  // namespace

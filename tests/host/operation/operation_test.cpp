@@ -108,6 +108,27 @@ TEST(Operation, KeepsWhatSpeaksAgainstARegistrationAndADeformation) {
   EXPECT_NE(other.error().what.find("1.0 2.0 3.0"), std::string::npos) << other.error().what;
 }
 
+TEST(Operation, KeepsLandmarksThatWerePickedAndTheTipThatTouched) {
+  const Scratch scratch;
+  Operation kept = whole_operation();
+  kept.landmarks = {{"landmark 1", {1, -2, 1.0 / 3}}, {"landmark 2", {40, 50, 60}}};
+  kept.registered->tip_in_pointer_mm = Eigen::Vector3d(0, 1.0 / 3, 150);
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  const auto read = read_operation(scratch.path());
+  ASSERT_TRUE(read) << read.error().what;
+  ASSERT_EQ(read->landmarks.size(), 2U);
+  EXPECT_EQ(read->landmarks[0].name, "landmark 1");
+  EXPECT_EQ(read->landmarks[0].place_mm, Eigen::Vector3d(1, -2, 1.0 / 3));
+  EXPECT_EQ(read->landmarks[1].place_mm, Eigen::Vector3d(40, 50, 60));
+  EXPECT_EQ(read->registered->tip_in_pointer_mm, Eigen::Vector3d(0, 1.0 / 3, 150));
+  kept.landmarks[1].place_mm.x() = 1e9;
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  const auto refused = read_operation(scratch.path());
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().what.find("landmarks: has a landmark farther than"), std::string::npos)
+      << refused.error().what;
+}
+
 /// At which angle a rod was an operation does not keep, and nothing is drawn by another.
 TEST(Operation, OfAScopeWithARodTheAngleIsMissing) {
   const Scratch scratch;

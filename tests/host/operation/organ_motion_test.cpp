@@ -35,6 +35,10 @@ CheckedSurface said(SurfaceVerdict verdict, int at_s) {
   return {finding, HostTime{at_s * 1000 * kMs}};
 }
 
+HostTime at_second(int s) {
+  return HostTime{s * 1000 * kMs};
+}
+
 constexpr SurfaceVerdict kHolds = SurfaceVerdict::holds, kMoved = SurfaceVerdict::moved,
                          kCannotTell = SurfaceVerdict::cannot_tell;
 
@@ -60,18 +64,52 @@ TEST(OrganMotion, WhatCannotBeToldChangesNothingAndIsToldAfterTenSeconds) {
   (void)motion.take(said(kHolds, 0));
   for (int s = 1; s <= 10; ++s) {
     EXPECT_FALSE(motion.take(said(kCannotTell, s)));
-    EXPECT_EQ(motion.line(), "surface: 0.4 mm off");
-    EXPECT_TRUE(motion.told());
+    EXPECT_EQ(motion.line(at_second(s)), "surface: 0.4 mm off");
+    EXPECT_TRUE(motion.told(at_second(s)));
   }
   EXPECT_FALSE(motion.take(said(kCannotTell, 11)));
-  EXPECT_EQ(motion.line(), "for 10 s it cannot be told whether the organ has moved: smoke");
-  EXPECT_FALSE(motion.told());
+  EXPECT_EQ(motion.line(at_second(11)), "for 10 s it cannot be told whether the organ has moved: smoke");
+  EXPECT_FALSE(motion.told(at_second(11)));
   // Nor does it stand between two that say the same.
   EXPECT_FALSE(motion.take(said(kMoved, 12)));
   EXPECT_FALSE(motion.take(said(kCannotTell, 13)));
   EXPECT_TRUE(motion.take(said(kMoved, 14)));
   for (int s = 15; s < 40; ++s) EXPECT_FALSE(motion.take(said(kCannotTell, s)));
   EXPECT_TRUE(motion.moved_mm().has_value());
+}
+
+TEST(OrganMotion, HasToldNothingBeforeACheckThatCould) {
+  OrganMotion motion;
+  EXPECT_TRUE(motion.unchecked());
+  (void)motion.take(said(kCannotTell, 0));
+  EXPECT_TRUE(motion.unchecked());
+  EXPECT_FALSE(motion.told(at_second(0)));
+  (void)motion.take(said(kHolds, 1));
+  EXPECT_FALSE(motion.unchecked());
+  EXPECT_TRUE(motion.told(at_second(1)));
+}
+
+/// The line over the picture may not turn green by it.
+TEST(OrganMotion, AFirstCheckThatSaysItHasMovedBearsNothingOut) {
+  OrganMotion motion;
+  (void)motion.take(said(kMoved, 0));
+  EXPECT_FALSE(motion.unchecked());
+  EXPECT_FALSE(motion.told(at_second(0)));
+  EXPECT_EQ(motion.line(at_second(30)), "surface: 5.0 mm off");
+  EXPECT_TRUE(motion.take(said(kMoved, 1)));
+  EXPECT_TRUE(motion.told(at_second(1)));
+}
+
+/// As where no pose comes that is to be believed, or a check does not end.
+TEST(OrganMotion, WhatWasFoundGrowsOldWhereNothingIsCheckedAnyMore) {
+  OrganMotion motion;
+  (void)motion.take(said(kHolds, 0));
+  EXPECT_TRUE(motion.told(at_second(10)));
+  EXPECT_FALSE(motion.told(at_second(30)));
+  EXPECT_EQ(motion.line(at_second(30)), "for 30 s no check has borne out what was found");
+  (void)motion.take(said(kHolds, 31));
+  EXPECT_TRUE(motion.told(at_second(31)));
+  EXPECT_EQ(motion.line(at_second(31)), "surface: 0.4 mm off");
 }
 
 /// The scope at its place, or so many mm beside it, looking at the CT's middle.

@@ -83,6 +83,17 @@ TEST(CalibrationStep, OfTwoCalibrationsTheNewerCounts) {
   EXPECT_EQ(CalibrationStep().adopt(record), CalibrationStep::Adopted::no);
 }
 
+/// The tip is the registration's: the scope, and how its rod is turned, are as they were.
+TEST(CalibrationStep, ARecordOfAnotherTipIsOfNoOtherScope) {
+  CalibrationStep step;
+  auto record = example_record(768, 576, {}, {});
+  EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::again) << "there was none before it";
+  record.tip->tip_in_sensor_mm.z() += 1;
+  EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::again);
+  record.tip.reset();
+  EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::again);
+}
+
 /// The appliance tells that the scope was exchanged since the board was used.
 TEST(CalibrationStep, ARecordOfAnotherScopeCountsThoughTheBoardWasUsedLater) {
   for (const bool record_first : {true, false}) {
@@ -194,6 +205,48 @@ TEST(FiducialStep, FitsWhatIsTouchedOnceTheMarkersAreKnown) {
   step.fit(kFiducials, 4, nullptr);
   EXPECT_TRUE(step.registered().has_value());
   EXPECT_FALSE(step.note().done) << "three leave open which is which";
+}
+
+/// Once: a video that contradicts again and again would else let nobody register.
+TEST(FiducialStep, ATouchSinceSomethingSpokeAgainstTheFormerBeginsAnewOnce) {
+  FiducialStep step;
+  step.add(touch_at(kFiducials[0]), 4, {});
+  step.add(touch_at(kFiducials[1]), 4, {});
+  EXPECT_FALSE(step.begins_anew());
+  step.suspect();
+  EXPECT_TRUE(step.begins_anew());
+  EXPECT_TRUE(step.add(touch_at(kFiducials[2]), 4, {}));
+  EXPECT_FALSE(step.begins_anew());
+  step.fit(kFiducials, 4, nullptr);
+  EXPECT_EQ(step.touches().size(), 1U);
+  EXPECT_EQ(step.note().line, "1 touched anew, dropped from before: 2");
+  EXPECT_TRUE(step.suspected()) << "the video has not been seen to agree since";
+  step.suspect();
+  step.add(touch_at(kFiducials[3]), 4, {});
+  EXPECT_EQ(step.touches().size(), 2U);
+}
+
+/// Nothing is left then that could be of another setup.
+TEST(FiducialStep, WhereAllTouchesWereTakenBackNothingIsSuspectedOfTheNext) {
+  FiducialStep step;
+  step.add(touch_at(kFiducials[0]), 4, {});
+  step.suspect();
+  EXPECT_TRUE(step.take_back(0));
+  step.fit(kFiducials, 4, nullptr);
+  step.add(touch_at(kFiducials[0]), 4, {});
+  EXPECT_FALSE(step.suspected());
+}
+
+TEST(FiducialStep, WhereAllWereTouchedAndSomethingSpokeAgainstThemANewTouchBeginsAnew) {
+  FiducialStep step;
+  for (const Eigen::Vector3d& fiducial : kFiducials) step.add(touch_at(fiducial), 4, {});
+  step.fit(kFiducials, 4, nullptr);
+  ASSERT_TRUE(step.registered().has_value());
+  step.suspect();
+  EXPECT_TRUE(step.add(touch_at(kFiducials[0]), 4, {}));
+  step.fit(kFiducials, 4, nullptr);
+  EXPECT_EQ(step.touches().size(), 1U);
+  EXPECT_FALSE(step.registered().has_value());
 }
 
 /// Markers about an organ, and touches of them; one is off.

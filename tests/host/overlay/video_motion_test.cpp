@@ -95,6 +95,29 @@ TEST(VideoMotion, WhatMovesIsSeenAndHasToAgreeTwiceAsOftenAfter) {
   EXPECT_EQ(about.motion.state(), VideoAgreement::agrees);
 }
 
+/// In seconds from zero, by steps of a tenth; 20 where it does not.
+double agrees_after_s(LookingAbout& about) {
+  int steps = 0;
+  do about.look(0.1 * steps++, 0.1);
+  while (about.motion.state() != VideoAgreement::agrees && steps < 200);
+  return 0.1 * steps;
+}
+
+/// As of an appliance that was started anew: the scope is the one that had differed.
+TEST(VideoMotion, WhatHasDifferedHasToAgreeTwiceAsOftenThoughTheClockWentBack) {
+  LookingAbout fresh;
+  const double once_s = agrees_after_s(fresh);
+  LookingAbout about;
+  about.look(0, 10);
+  about.scene_moves = [](double t_s) { return Vector(Vector(9, 9, 0) * std::min(1.0, 3 * (t_s - 10))); };
+  about.look(10, 1);
+  ASSERT_EQ(about.motion.state(), VideoAgreement::differs);
+  about.scene_moves = nullptr;
+  const double twice_s = agrees_after_s(about);
+  EXPECT_GT(twice_s, once_s);
+  EXPECT_LT(twice_s, 20);
+}
+
 TEST(VideoMotion, IsInDoubtFromTheFirstPictureThatDoesNotAgree) {
   LookingAbout about;
   about.look(0, 10);
