@@ -183,6 +183,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
   TrackerLoop unit(line.instrument(), tracker_of(truth, operation.seed, out.faults, zero_ns), {});
   unit.align(zero_ns + 1);  // before the first measurement
   LocalCamera::Settings camera_settings;
+  camera_settings.name = truth.camera_name();
   camera_settings.width_px = truth.lens(0).width_px;
   camera_settings.height_px = truth.lens(0).height_px;
   if (scene != nullptr) {
@@ -272,7 +273,9 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     journal.follow(now, screen, words_of(shown));
     if (journal.at_s(now) < acts_at_s) continue;
     acts_at_s = journal.at_s(now) + kActs_s;
+    const std::size_t presses = surgeon.presses();
     surgeon.act(journal.at_s(now), now, shown);
+    if (surgeon.presses() > presses) laws.pressed(now);
     if (journal.at_s(now) >= memory_at_s) {
       memory_at_s = journal.at_s(now) + kMemory_s;
       laws.take_memory(heap_bytes_in_use(), now);
@@ -344,6 +347,7 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
                                               operation.seed)};
   }
   truth.exchange_scopes(std::move(exchanged_at_s));
+  if (!at_board) truth.fit_rods(operation.seed);
   WindowSettings window;
   window.video_must_agree = operation.pictures;
   if (at_board) {

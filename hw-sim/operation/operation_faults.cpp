@@ -142,6 +142,10 @@ constexpr double kFlockStarts_s = 1.5;  // the waits that a flock needs from its
 
 }  // namespace
 
+double takes_s(const Fault& fault) {
+  return fault.values.contains("over_s") ? fault.value("over_s") : 0;
+}
+
 bool starts_appliance(FaultKind kind) {
   return kind == FaultKind::appliance_restart || kind == FaultKind::scope_exchanged ||
          kind == FaultKind::appliance_power_cut;

@@ -30,6 +30,9 @@ struct FaultSigns {
 /// times of that.
 inline constexpr double kUnseenChange_mm = 30;
 
+/// Of what befalls the world: from how it was to how it is.
+double takes_s(const Fault& fault);
+
 /// Whether birdseyed ends by it, and is started at its end.
 bool starts_appliance(FaultKind kind);
 

@@ -25,14 +25,10 @@ constexpr double kQuantum_deg = 0.02;    // of a matrix's words, and rounding
 constexpr double kTrackHolds_s = 0.1;    // a reading after a longer hole is believed once the next agrees
 constexpr double kNoiseIsKnown_s = 2.5;  // after a bird's first record
 constexpr double kTimeLimit_s = 0.010;   // of [pose] max_time_sigma_ms: what TDATA promises
-constexpr double kMostAge_ms = 150;
-constexpr double kMostCircles = 3, kPromisedCircles = 1.5;
-constexpr double kMostBeyond = 0.001;  // of whole overlays, by more than the latter
+constexpr double kMostBeyond = 0.001;    // of whole overlays, by more than the latter
 constexpr std::uint64_t kFewestJudged = 10'000;
 constexpr double kNamedWithin_s = 2, kOverWithin_s = 2;
-constexpr double kCalm_s = 10;     // after a fault's end what it had the window see may still be weighed
 constexpr double kAlone_s = 5;     // from another fault's end to this one's begin, and after it
-constexpr double kLinger_s = 0.5;  // after a fault's end poses may still be made of samples that it touched
 constexpr double kMatches_s = 30;  // that the first matching of the CT takes until it holds all that it needs
 constexpr std::size_t kMostGrowth = std::size_t{16} << 20;
 constexpr std::size_t kMostBroken = 100;  // that are told
@@ -50,11 +46,6 @@ double speed_mm_s(const OperationTruth& truth, std::size_t bird, double at_s) {
 
 double degrees_between(const Eigen::Matrix3d& one, const Eigen::Matrix3d& other) {
   return Eigen::AngleAxisd(Eigen::Matrix3d(one.transpose() * other)).angle() * kDegPerRad;
-}
-
-/// Of what befalls the world: from how it was to how it is.
-double takes_s(const Fault& fault) {
-  return fault.values.contains("over_s") ? fault.value("over_s") : 0;
 }
 
 /// What birds are fixed on, or all of them through the transmitter, against the rest of the world.
@@ -86,7 +77,11 @@ std::size_t bird_of(const std::string& name) {
 
 OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& faults, ExposedNs exposed_ns,
                              std::int64_t zero_ns)
-    : truth_(truth), exposed_ns_(std::move(exposed_ns)), zero_ns_(zero_ns), begins_at_board_(truth.at_board(0)) {
+    : truth_(truth),
+      exposed_ns_(std::move(exposed_ns)),
+      zero_ns_(zero_ns),
+      doubts_(truth, zero_ns),
+      begins_at_board_(truth.at_board(0)) {
   for (const FaultTarget target : kFaultTargets) {
     for (const Fault& fault : faults.of(target)) {
       const FaultSigns signs = target == FaultTarget::world ? FaultSigns{} : signs_of(fault, target);
@@ -123,6 +118,33 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
     moves_.push_back({back_s, back_s + takes_s(fault), of_patient});
   }
   std::ranges::sort(moves_, {}, &Move::begins_s);
+  if (referenced) expect_slips();
+}
+
+bool OperationLaws::is_quiet(const Span& span, double at_s) const {
+  constexpr double kApart_s = 1;
+  return std::ranges::none_of(spans_, [&](const Span& other) {
+    if (&other == &span || other.signs.aside || other.of == FaultTarget::camera) return false;
+    if (other.of == FaultTarget::world) return moves_birds(other.fault) && changes_about(other, at_s);
+    return at_s > other.begins_s - kApart_s && at_s < other.ends_s + kApart_s;
+  });
+}
+
+/// A slip that is slower, or shorter, is told from a patient who moves by nobody (OVL-46).
+void OperationLaws::expect_slips() {
+  constexpr double kFar_mm = 8, kQuickly_s = 0.1;  // twice as far as the window sees, within as long
+  std::vector<std::pair<double, double>> slips;
+  for (const Span& span : spans_) {
+    const Fault& fault = span.fault;
+    if (fault.kind != FaultKind::reference_moved || fault.value("mm") < kFar_mm || takes_s(fault) > kQuickly_s)
+      continue;
+    std::vector<double> begins_s{fault.at_s};
+    if (fault.for_s) begins_s.push_back(fault.at_s + *fault.for_s);
+    for (const double begin_s : begins_s)
+      if (is_quiet(span, begin_s)) slips.emplace_back(begin_s, begin_s + takes_s(fault));
+  }
+  std::ranges::sort(slips);
+  for (const auto& [begin_s, end_s] : slips) doubts_.come_off(begin_s, end_s);
 }
 
 std::string OperationLaws::name_of(const Span& span) {
@@ -249,6 +271,7 @@ void OperationLaws::take(const wire::Health& health, double now_s) {
 
 void OperationLaws::take(const wire::Event& event, HostTime now) {
   const double now_s = at_s(now.ns);
+  doubts_.take(event, now_s);
   if (const auto* const birds = std::get_if<wire::Birds>(&event)) take(*birds, now_s);
   if (const auto* const frame = std::get_if<wire::VideoFrame>(&event)) take(*frame, now_s);
   if (const auto* const health = std::get_if<wire::Health>(&event)) take(*health, now_s);
@@ -301,101 +324,6 @@ void OperationLaws::take_memory(std::size_t bytes, HostTime now) {
   }
 }
 
-void OperationLaws::note_motion(bool whole, double now_s) {
-  constexpr double kWatched_s = 0.5;
-  for (; next_move_ < moves_.size() && moves_[next_move_].begins_s <= now_s; ++next_move_) {
-    if (!moves_[next_move_].of_patient) continue;
-    ++figures_.moved;
-    if (!registered_ || (whole_s_ && moves_[next_move_].begins_s - *whole_s_ < kWatched_s)) continue;
-    ++figures_.moved_unwatched;
-    unwatched_to_s_ = moves_[next_move_].ends_s;
-  }
-  if (whole) whole_s_ = now_s;
-}
-
-/// What the frame shows is on its way, or was so lately that no later frame can have told of it.
-bool OperationLaws::moves_at(double exposed_s) const {
-  constexpr double kTakes_s = 0.1;
-  return std::ranges::any_of(moves_, [exposed_s](const Move& move) {
-    return exposed_s >= move.begins_s && exposed_s < move.ends_s + kTakes_s;
-  });
-}
-
-/// Of a whole overlay: the turn of the scope, or the zoom of the lens, must have been seen.
-void OperationLaws::judge_scope(double exposed_s, double now_s) {
-  constexpr double kSeenWithin_s = 3, kTurned_deg = 20, kZoomed = 1.15;
-  for (const Span& span : spans_) {
-    const Fault& fault = span.fault;
-    const bool turned = fault.kind == FaultKind::scope_turned && std::abs(fault.value("deg")) >= kTurned_deg;
-    const bool zoomed =
-        fault.kind == FaultKind::lens_zoomed && std::max(fault.value("factor"), 1 / fault.value("factor")) >= kZoomed;
-    if (!turned && !zoomed) continue;
-    const double since_s = exposed_s - fault.at_s - takes_s(fault);
-    if (since_s > kSeenWithin_s && exposed_s < span.ends_s)
-      break_law(now_s, "turned", fmt::format("an overlay is whole {:.1f} s after {}", since_s, fault_name(fault.kind)));
-  }
-}
-
-/// What the video shows is true: where no fault has touched its times or the poses, nobody may say that they differ.
-void OperationLaws::judge_accusation(bool accused, double now_s) {
-  const bool begins = accused && !accused_;
-  accused_ = accused;
-  const auto touches = [now_s](const Span& span) {
-    return !span.signs.aside && span.begins_s <= now_s && now_s < span.ends_s + kCalm_s;
-  };
-  if (begins && std::ranges::none_of(spans_, touches))
-    break_law(now_s, "accused", "the window says that video and poses do not agree, and nothing has befallen them");
-}
-
-void OperationLaws::take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now) {
-  const double now_s = at_s(now.ns);
-  ++figures_.shown;
-  note_motion(is_whole(shown), now_s);
-  if (!shown.overlaid || shown.strength <= 0 || !picture.frame()) return;
-  ++figures_.overlaid;
-  if (checks_when_opened_)
-    break_law(now_s, "kept", "the window was opened again, and draws before a landmark was checked");
-  const auto exposed_ns = exposed_ns_(picture.frame()->info.sequence);
-  if (!exposed_ns) return break_law(now_s, "age", "an overlay is on a frame that the camera never gave");
-  const double exposed_s = at_s(*exposed_ns);
-  const std::size_t scope = truth_.scope_in_use(exposed_s);
-  if (!begins_at_board_ && (!picture.setup() || picture.setup()->camera() != truth_.record_of(scope).lens->camera))
-    break_law(now_s, "setup", "an overlay is drawn with the calibration of a scope that is not in use");
-  if (in_doubt_) break_law(now_s, "setup", "an overlay is drawn by a registration that is in doubt or held back");
-  double lies_s = 0;
-  bool lies = false;
-  for (const Span& span : spans_) {
-    if (exposed_s < span.begins_s - kLinger_s || exposed_s > span.ends_s + kLinger_s) continue;
-    if (span.of == FaultTarget::camera) lies_s += span.signs.extra_s;
-    lies = lies || span.signs.lies || span.signs.extra_mm > 0 || span.signs.extra_s > 0;
-  }
-  const double age_ms = 1e3 * (now_s - exposed_s - lies_s);
-  figures_.worst_age_ms = std::max(figures_.worst_age_ms, age_ms);
-  if (age_ms > kMostAge_ms)
-    break_law(now_s, "age", fmt::format("an overlay's frame was exposed {:.0f} ms ago", age_ms));
-  const auto drawn_from = picture.camera_from_patient();
-  const auto& budget = picture.decision().expected;
-  if (!is_whole(shown) || !drawn_from || !budget) return;
-  ++figures_.green;
-  if (pictures_) judge_scope(exposed_s, now_s);
-  if (lies || unwatched_to_s_ || moves_at(exposed_s)) return;
-  const Eigen::Vector3d target_mm = truth_.target_mm() + truth_.organ(exposed_s).shift_mm;
-  const Eigen::Vector3d true_mm = truth_.camera_from_patient(exposed_s) * target_mm;
-  const auto true_px = project(truth_.lens(exposed_s), true_mm);
-  const Eigen::Vector3d shown_mm = picture.figures().target_in_patient_mm.value_or(truth_.target_mm());
-  const auto drawn_px = project(picture.setup()->camera(), Eigen::Vector3d(*drawn_from * shown_mm));
-  if (!true_px || !drawn_px) return;
-  ++figures_.judged;
-  const double off_mm = (*true_px - *drawn_px).norm() / truth_.lens(exposed_s).fx_px * true_mm.z();
-  const double circles = off_mm / budget->radius95_mm();
-  figures_.worst_circles = std::max(figures_.worst_circles, circles);
-  if (circles > kPromisedCircles) ++figures_.beyond;
-  if (circles > kMostCircles) {
-    break_law(now_s, "circle",
-              fmt::format("a whole overlay is {:.1f} mm off, its circle {:.1f} mm", off_mm, budget->radius95_mm()));
-  }
-}
-
 void OperationLaws::judge(const Span& span, double until_s) {
   const std::string name = fmt::format("{} at {:.3f} s", name_of(span), span.begins_s);
   const FaultSigns& signs = span.signs;
@@ -420,6 +348,7 @@ void OperationLaws::judge(const Span& span, double until_s) {
 }
 
 void OperationLaws::finish(double until_s) {
+  for (const auto& [name, of] : doubts_.figures()) figures_.by_fault["doubt " + name] = {of.began, of.judged, 0, 0};
   if (static_cast<double>(figures_.beyond) >
       kMostBeyond * static_cast<double>(std::max(figures_.judged, kFewestJudged))) {
     break_law(until_s, "circle",

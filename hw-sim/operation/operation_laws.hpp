@@ -1,12 +1,15 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <bitset>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "calibration/base/queue_fill.hpp"
@@ -16,6 +19,7 @@
 #include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/operation/operation_faults.hpp"
 #include "hw-sim/operation/operation_truth.hpp"
+#include "hw-sim/operation/registration_doubts.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -32,7 +36,8 @@ struct BrokenLaw {
 ///   is turned by more than 6 sigma of the tracker's noise.
 /// - age: no overlay is on the screen whose frame was exposed more than 150 ms ago.
 /// - setup: no overlay is drawn with the calibration of a scope that is not the one in use, nor by a registration that
-///   nobody has confirmed, that something speaks against, or that is held back.
+///   nobody has confirmed, that something speaks against, or that is held back: by the window's own word, and by what
+///   RegistrationDoubts knows of it, which asks no window.
 /// - circle: no overlay is shown as whole that is off by more than three circles, and of a thousand one at most by more
 ///   than one and a half. This is not asked of frames that are exposed while the scope turns in its holder or the lens
 ///   is zoomed, and 0.1 s after; nor, without a reference, while transmitter or patient move. Where these move while no
@@ -46,9 +51,10 @@ struct BrokenLaw {
 ///   again.
 /// - accused: later than 10 s after the last fault's end the window does not begin to say that video and poses differ.
 /// - kept: a window that is opened again takes up what the one before had as it was last neither writing nor said that
-///   something was not kept, or what it had later: the registration with its deformation, and the calibration over the
-///   board. It draws nothing before a landmark has been checked. What was taken back, and nothing else was kept, it
-///   does not take up. A window that cannot keep something says so within 2 s.
+///   something was not kept, or what it had later: the registration, which has the patient where it had him, with its
+///   deformation and all that is known of that, and the calibration over the board. It draws nothing before a landmark
+///   has been checked. What was taken back, and nothing else was kept, it does not take up. A window that cannot keep
+///   something says so within 2 s.
 /// - recorded: OperationRecording has it, and judges it.
 /// - queues: none holds more than its bound, in values or in bytes.
 /// - memory: it does not grow later than two minutes after the beginning, and 30 s after the first matching of the CT
@@ -75,6 +81,8 @@ class OperationLaws {
   void take(std::span<const QueueFill> queues, HostTime now);
   /// What all programs together hold.
   void take_memory(std::size_t bytes, HostTime now);
+  /// The surgeon has pressed Space in the landmark check.
+  void pressed(HostTime now) { doubts_.pressed(at_s(now.ns)); }
   /// What is on the screen.
   void take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now);
   /// At the end: until_s is when the operation ended.
@@ -95,7 +103,9 @@ class OperationLaws {
     std::uint64_t faults = 0, faults_judged = 0;
     std::uint64_t moved = 0, moved_unwatched = 0;    ///< how often transmitter or patient were, without a reference
     double slowest_named_s = 0, slowest_over_s = 0;  ///< less what the fault's signs allow
-    std::map<std::string, OfFault> by_fault;         ///< by target and kind, as "camera unplug"
+    /// By target and kind, as "camera unplug". And of what spoke against the registration, as "doubt no_video": how
+    /// often, and how often pictures were on the screen meanwhile.
+    std::map<std::string, OfFault> by_fault;
   };
   [[nodiscard]] const Figures& figures() const { return figures_; }
   [[nodiscard]] const std::vector<BrokenLaw>& broken() const { return broken_; }
@@ -115,11 +125,12 @@ class OperationLaws {
     double begins_s = 0, ends_s = 0;
     bool of_patient = false;  ///< of patient or transmitter against each other; else of scope or lens
   };
-  /// How a patient is registered, and the organ deformed, by what tells one from another.
+  /// How a patient is registered, and the organ deformed.
   struct Found {
     double fre_mm = 0;
-    std::string deformed_utc;  ///< when that was found; empty: the CT is shown as it was taken
-    std::size_t scope = 0;     ///< by whose record
+    std::shared_ptr<const host::DeformedOrgan> deformed;  ///< null: the CT is shown as it was taken
+    bool with_care = false;                               ///< the window says so of the deformation
+    std::size_t scope = 0;                                ///< by whose record
     bool operator==(const Found&) const = default;
   };
   [[nodiscard]] double at_s(std::int64_t ns) const { return static_cast<double>(ns - zero_ns_) * 1e-9; }
@@ -142,13 +153,22 @@ class OperationLaws {
   [[nodiscard]] std::optional<Found> found_in(const host::OperationView& view, double now_s);
   [[nodiscard]] bool is_kept(const Found& found) const;
   void judge_registration_kept(const host::OperationView& view, double now_s);
+  void judge_place_kept(const Transform<Tracker, Patient>& tracker_from_patient, double now_s);
   void judge_calibration_kept(const host::OperationView& view, double now_s);
   [[nodiscard]] bool moves_at(double exposed_s) const;
+  /// Nothing else befalls then that could keep the window from seeing what slips.
+  [[nodiscard]] bool is_quiet(const Span& span, double at_s) const;
+  void expect_slips();
+  void judge_setup(const host::LivePicture& picture, double exposed_s, double now_s);
+
+  static constexpr double kLinger_s = 0.5;  ///< after a fault's end poses may still be made of samples that it touched
+  static constexpr double kPromisedCircles = 1.5;
 
   const OperationTruth& truth_;
   ExposedNs exposed_ns_;
   std::int64_t zero_ns_;
   std::vector<Span> spans_;
+  RegistrationDoubts doubts_;
   std::optional<wire::Health> before_;
   std::optional<double> ready_since_s_;
   std::vector<Move> moves_;               ///< that the video alone shows, in their order
@@ -162,6 +182,9 @@ class OperationLaws {
   std::optional<double> unsaid_since_s_;  ///< a sync failed then, and the window has not said so
   /// What was kept last, and what was found since. Empty: nothing was kept, or it may have been taken back.
   std::vector<Found> kept_;
+  std::optional<double> fre_mm_;  ///< of the registration that the window has
+  /// Where each registration that was drawn by had the patient, by its FRE: no two have the same.
+  std::vector<std::pair<double, Eigen::Matrix4d>> places_;
   bool nothing_kept_ = true;      ///< there is no registration on the disk: none was found, or it was taken back
   bool none_to_take_up_ = false;  ///< this window was opened so, and nothing was touched since
   bool in_doubt_ = false;         ///< the registration is in doubt, or held back

@@ -1,6 +1,7 @@
 // The law that what was said to be kept is there again.
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 #include "host/texts/texts.hpp"
@@ -12,10 +13,43 @@ namespace {
 
 constexpr double kTakesUpWithin_s = 2;  // once the instruments are those that it was registered with
 constexpr double kSaidWithin_s = 2;     // that something could not be kept
+constexpr double kSame_mm = 1e-6;       // what was kept is text in between
+
+/// kept, found: double or places, in mm.
+template <typename Values>
+bool is_same(const std::optional<Values>& kept, const std::optional<Values>& found) {
+  if (!kept || !found) return kept.has_value() == found.has_value();
+  if constexpr (std::is_same_v<Values, double>)
+    return std::abs(*kept - *found) < kSame_mm;
+  else
+    return (*kept - *found).norm() < kSame_mm;
+}
+
+bool is_same(const host::DisplacementField& kept, const host::DisplacementField& found) {
+  const auto near = [](const Eigen::Vector3f& one, const Eigen::Vector3f& other) {
+    return (one - other).norm() < static_cast<float>(kSame_mm);
+  };
+  return kept.size == found.size && std::ranges::equal(kept.displacement_mm, found.displacement_mm, near) &&
+         (kept.patient_from_lattice.matrix() - found.patient_from_lattice.matrix()).norm() < kSame_mm;
+}
+
+/// Its shape, how far it may be off, of which target that is, and with what care it is to be used.
+bool is_same(const std::shared_ptr<const host::DeformedOrgan>& kept,
+             const std::shared_ptr<const host::DeformedOrgan>& found) {
+  if (!kept || !found) return kept == found;
+  const auto error_of = [](const host::DeformedOrgan& organ) -> std::optional<Eigen::Vector2d> {
+    if (!organ.target) return std::nullopt;
+    return Eigen::Vector2d(organ.target->rms_mm, organ.target->radius95_mm);
+  };
+  return kept->made_utc == found->made_utc && kept->care == found->care && is_same(kept->field, found->field) &&
+         is_same(kept->seen_rms_mm, found->seen_rms_mm) && is_same(error_of(*kept), error_of(*found)) &&
+         is_same(kept->target_at_rest_mm, found->target_at_rest_mm);
+}
 
 }  // namespace
 
 void OperationLaws::opened(std::size_t checks) {
+  doubts_.opened();
   accused_ = false;
   to_take_up_ = !kept_.empty();
   board_to_take_up_ = board_kept_;
@@ -77,22 +111,38 @@ std::optional<OperationLaws::Found> OperationLaws::found_in(const host::Operatio
   // Before, the window holds what it found with the former scope.
   if (view.note(host::LiveStep::calibrate).done) scope_ = truth_.scope_in_use(now_s);
   if (!view.fre_mm) return std::nullopt;  // three touches register, though the step asks for a fourth
-  return Found{*view.fre_mm, view.deformed ? view.deformed->made_utc : std::string(), scope_};
+  return Found{*view.fre_mm, view.deformed, view.deformed_with_care, scope_};
 }
 
 bool OperationLaws::is_kept(const Found& found) const {
-  constexpr double kSame_mm = 1e-6;
   return std::ranges::any_of(kept_, [&](const Found& one) {
+    if (std::abs(one.fre_mm - found.fre_mm) >= kSame_mm) return false;
     // By the views of one scope the organ is not deformed for another.
-    const std::string deformed_utc = one.scope == found.scope ? one.deformed_utc : std::string();
-    return std::abs(one.fre_mm - found.fre_mm) < kSame_mm && found.deformed_utc == deformed_utc;
+    if (one.scope != found.scope) return !found.deformed;
+    return one.with_care == found.with_care && is_same(one.deformed, found.deformed);
   });
+}
+
+/// By FRE alone a registration that was kept wrongly would pass for the right one.
+void OperationLaws::judge_place_kept(const Transform<Tracker, Patient>& tracker_from_patient, double now_s) {
+  // What was kept is the same to the bit. Of dozens of registrations two may well be alike to kSame_mm.
+  constexpr double kSameFre_mm = 1e-9;
+  if (!fre_mm_) return;
+  const auto& matrix = tracker_from_patient.matrix();
+  const auto known = std::ranges::find_if(
+      places_, [this](const auto& place) { return std::abs(place.first - *fre_mm_) < kSameFre_mm; });
+  if (known == places_.end()) {
+    places_.emplace_back(*fre_mm_, matrix);
+  } else if ((known->second - matrix).norm() >= kSame_mm) {
+    break_law(now_s, "kept", "an overlay is drawn by a registration that had the patient elsewhere before");
+  }
 }
 
 void OperationLaws::take_kept(const host::OperationView& view, std::uint64_t failed_syncs, bool powerless,
                               HostTime now) {
   const double now_s = at_s(now.ns);
   const bool all_kept = !view.writing && view.fault.empty() && !powerless;
+  fre_mm_ = view.fre_mm;
   in_doubt_ = view.unconfirmed || view.registration_held_back;
   board_kept_ |= all_kept && begins_at_board_ && view.note(host::LiveStep::calibrate).done;
   // What a window has not taken up yet is there all the same.

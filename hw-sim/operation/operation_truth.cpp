@@ -1,11 +1,14 @@
 #include "hw-sim/operation/operation_truth.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/camera_parameters.hpp"
+#include "calibration/geometry/rod.hpp"
 #include "calibration/geometry/rotations.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/camera/laparoscope.hpp"
@@ -42,6 +45,10 @@ class Numbers {
   std::uint64_t seed_, key_ = 0;
 };
 
+std::string serial_of(std::uint64_t seed) {
+  return fmt::format("{:08x}", hashed_word(seed, std::uint64_t{1} << 32) >> 32);
+}
+
 }  // namespace
 
 OperationTruth::OperationTruth(std::uint64_t seed, int width_px, int height_px, Happenings happenings, bool reference)
@@ -55,6 +62,10 @@ OperationTruth::OperationTruth(std::uint64_t seed, int width_px, int height_px, 
   target_mm_ = organ_middle_mm() + drawn.within(8);
   for (face_mm_ = target_mm_; organ_mm(face_mm_) < 0;) face_mm_.z() -= 1;
   hand_.rest_at({0, 0, 200}, 0);
+  // Each of these follows from a word of its own: nothing else of a seed changes with them.
+  Numbers of_pointer(hashed_word(seed, 22));
+  tip_in_pointer_mm_ = Vector3d(0, 0, 150) + Vector3d(1, 1, 3).cwiseProduct(of_pointer.within(12));
+  camera_name_ = "sim:camera-" + serial_of(hashed_word(seed, 23));
   const CameraModel lens = laparoscope_lens(width_px, height_px);
   CameraModel narrower = lens;
   narrower.fx_px *= 1.2;
@@ -67,7 +78,7 @@ OperationTruth::OperationTruth(std::uint64_t seed, int width_px, int height_px, 
 /// hand-eye is off by rotations and translations about the camera, of these sigmas. The record has what was found, and
 /// how good it is.
 OperationTruth::Scope OperationTruth::calibrated(const CameraModel& lens, const Transform<Camera, Sensor>& found,
-                                                 std::uint64_t seed) {
+                                                 std::uint64_t seed) const {
   constexpr double kTurned_rad = 0.002, kShifted_mm = 0.2, kLens = 0.0004;  // kLens: of the focal length
   constexpr int kStations = 20;
   Numbers drawn(seed);
@@ -97,9 +108,9 @@ OperationTruth::Scope OperationTruth::calibrated(const CameraModel& lens, const 
   const double held_out_mm = std::sqrt(2.0) * std::hypot(own_mm, pose_mm);
 
   calibration::CalibrationRecord record;
-  record.scope = "simulated";
+  record.scope = "LAP-" + serial_of(seed);
   record.tracker = {{"model", "6DFOB"}};
-  record.camera = {{"model", "simulated"}};
+  record.camera = {{"model", "simulated"}, {"serial", camera_name_}};
   const calibration::Provenance provenance{"2026-11-26T09:30:00Z", "birdseye-sim", "the truth", Grade::pass};
   record.lens = calibration::LensEntry{provenance, found_lens, "radial3_tangential2", lens_covariance,
                                        lens_px,    lens_px,    std::nullopt,          std::nullopt};
@@ -112,7 +123,31 @@ OperationTruth::Scope OperationTruth::calibrated(const CameraModel& lens, const 
                                               std::nullopt,
                                               kStations};
   record.latency = calibration::LatencyEntry{provenance, 0, -1, 1, 0};
-  return {lens, camera_from_sensor, std::move(record)};
+  return {lens, camera_from_sensor, found, std::move(record)};
+}
+
+/// An oblique scope: its rod's axis lies aside of the camera's. Both rods are read off at one angle; each was
+/// calibrated at another.
+void OperationTruth::fit_rods(std::uint64_t seed) {
+  constexpr double kHasOne = 0.25, kReads_deg = 90, kTurned_deg = 60, kOblique_rad = 0.12, kBeside_mm = 2;
+  const double reads_deg = Numbers(hashed_word(seed, 25)).within(kReads_deg).x();
+  for (std::size_t scope = 0; scope < scopes_.size(); ++scope) {
+    const std::uint64_t own = hashed_word(hashed_word(seed, 24), scope);
+    Numbers drawn(own);
+    const Vector3d turned_deg = drawn.within(kTurned_deg), tilted = drawn.within(kOblique_rad),
+                   beside_mm = drawn.within(kBeside_mm);
+    if (hashed_uniform(own, std::uint64_t{1} << 32) >= kHasOne) continue;
+    Scope& one = scopes_[scope];
+    const Transform<Camera, Sensor> found = one.found_camera_from_sensor;
+    RodScope rod{found, found.rotation().transpose() * (rotation_exp(tilted) * Vector3d::UnitZ()),
+                 found.inverse() * beside_mm, 1};
+    one.record.hand_eye->rod = calibration::RodEntry{reads_deg - turned_deg.x(), rod.axis_in_sensor,
+                                                     rod.axis_point_in_sensor_mm, rod.picture_turn};
+    one.found_camera_from_sensor = rod.camera_from_sensor(turned_deg.x() * kRadPerDeg);
+    rod.camera_from_sensor_at_zero = one.camera_from_sensor;
+    one.camera_from_sensor = rod.camera_from_sensor(turned_deg.x() * kRadPerDeg);
+    rod_angle_deg_ = reads_deg;
+  }
 }
 
 const Vector3d& OperationTruth::organ_middle_mm() {

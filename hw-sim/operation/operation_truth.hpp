@@ -6,6 +6,7 @@
 #include <deque>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "calibration/base/result.hpp"
@@ -34,6 +35,10 @@ class OperationTruth {
   Result<void> begin_at_board(std::uint64_t seed);
   /// At each of these times the one of the two scopes that is in use is exchanged for the other.
   void exchange_scopes(std::vector<double> at_s);
+  /// Some scopes have a rod that turns in the camera head, and it is not where it was as the scope was calibrated.
+  void fit_rods(std::uint64_t seed);
+  /// What is read off at whichever scope has a rod. Empty: none has one.
+  [[nodiscard]] const std::optional<double>& rod_angle_deg() const { return rod_angle_deg_; }
   /// It goes to the patient from then on.
   void leave_board(double at_s) { left_board_s_ = at_s; }
   [[nodiscard]] bool at_board(double at_s) const { return bench_ && at_s < left_board_s_; }
@@ -58,6 +63,7 @@ class OperationTruth {
   static constexpr double kHurry_s = 4, kCarry_s = 3;
   /// Where the pointer's tip goes, patient frame.
   HandPath& hand() { return hand_; }
+  [[nodiscard]] const HandPath& hand() const { return hand_; }
 
   // Patient frame, mm.
   [[nodiscard]] const std::vector<Eigen::Vector3d>& fiducials_mm() const { return fiducials_mm_; }
@@ -80,6 +86,12 @@ class OperationTruth {
   [[nodiscard]] const calibration::CalibrationRecord& record_of(std::size_t scope) const {
     return scopes_[scope].record;
   }
+  /// By that record, with the rod as it is.
+  [[nodiscard]] const Transform<Camera, Sensor>& found_camera_from_sensor(std::size_t scope) const {
+    return scopes_[scope].found_camera_from_sensor;
+  }
+  /// What the camera head says that it is.
+  [[nodiscard]] const std::string& camera_name() const { return camera_name_; }
   /// As the pictures of a scope show it: its record has it from then on.
   void enter_round_field(std::size_t scope, const std::optional<RoundField>& seen);
 
@@ -89,10 +101,11 @@ class OperationTruth {
  private:
   struct Scope {
     CameraModel lens;
-    Transform<Camera, Sensor> camera_from_sensor;
+    Transform<Camera, Sensor> camera_from_sensor, found_camera_from_sensor;
     calibration::CalibrationRecord record;
   };
-  static Scope calibrated(const CameraModel& lens, const Transform<Camera, Sensor>& found, std::uint64_t seed);
+  [[nodiscard]] Scope calibrated(const CameraModel& lens, const Transform<Camera, Sensor>& found,
+                                 std::uint64_t seed) const;
   [[nodiscard]] double on_its_way_s(double at_s) const;
   /// Of a scope in a hurry, beside its way: the camera's turn (rad) and shift (mm).
   struct Swing {
@@ -113,7 +126,9 @@ class OperationTruth {
   Transform<Patient, Sensor> patient_from_reference_{Eigen::Matrix3d::Identity(), {40, 90, -10}};
   std::array<Scope, 2> scopes_;
   std::vector<double> exchanged_at_s_;
-  Eigen::Vector3d tip_in_pointer_mm_{0, 0, 150}, target_mm_;
+  std::string camera_name_;
+  std::optional<double> rod_angle_deg_;
+  Eigen::Vector3d tip_in_pointer_mm_, target_mm_;
   Eigen::Vector3d face_mm_;  ///< of the organ, where the scope looks at it
   std::vector<Eigen::Vector3d> fiducials_mm_;
 };

@@ -41,6 +41,7 @@ Result<std::unique_ptr<host::LiveWorkflow>> open_window(const WindowSettings& wi
     return std::unique_ptr<host::Engine>(std::make_unique<NoEngine>());
   };
   settings.tip_in_pointer_mm = truth.tip_in_pointer_mm();
+  settings.rod_angle_deg = truth.rod_angle_deg();
   settings.fiducials = truth.fiducials_mm().size();
   settings.video_must_agree = window.video_must_agree;
   settings.pattern = window.pattern;

@@ -99,18 +99,24 @@ bool Surgeon::points_at_one(double at_s) const {
   return is_there(truth_.target_mm()) || std::ranges::any_of(truth_.fiducials_mm(), is_there);
 }
 
+/// In the landmark check.
+void Surgeon::press(HostTime now) {
+  ++presses_;
+  workflow_->primary(now);
+}
+
 /// In haste: where a landmark is asked for, the large button is pressed before anything is pointed at, which may not be
 /// taken for a look. Where the landmark does not fit, the patient is registered anew.
 void Surgeon::check(const host::OperationView& view, double at_s, HostTime now) {
   if (!at_landmark_) {
-    if (view.unconfirmed) workflow_->primary(now);
+    if (view.unconfirmed) press(now);
     at_landmark_ = workflow_->view().step == LiveStep::check;
     if (at_landmark_) return go_to(truth_.target_mm(), at_s, kCheckRests_s);
     checks_ += points_at_one(at_s) ? 1 : 0;
     return;
   }
   const bool first = !view.fits_at_one;
-  workflow_->primary(now);
+  press(now);
   if (first && workflow_->view().fits_at_one) return go_to(truth_.fiducials_mm().front(), at_s, kCheckRests_s);
   at_landmark_ = false;
   if (workflow_->view().unconfirmed) {
@@ -120,6 +126,14 @@ void Surgeon::check(const host::OperationView& view, double at_s, HostTime now) 
   }
   bare_since_s_ = at_s;
   go_to(kAside_mm, at_s, 0);
+}
+
+/// The window does not know how the rod of a scope that has just come is turned.
+void Surgeon::read_rod_off() {
+  const auto asked = [&] { return workflow_->view().has_rod && !workflow_->view().rod_angle_deg; };
+  if (!truth_.rod_angle_deg() || !asked()) return;
+  workflow_->turn_rod(0);  // to the angle at which it was calibrated
+  if (!asked()) workflow_->turn_rod(*truth_.rod_angle_deg() - *workflow_->view().rod_angle_deg);
 }
 
 void Surgeon::act(double at_s, HostTime now, const host::ShownPicture& shown) {
@@ -133,6 +147,7 @@ void Surgeon::act(double at_s, HostTime now, const host::ShownPicture& shown) {
   if (at_s < busy_until_s_) return;
   if (workflow_->view().asks_for_instruments) workflow_->confirm_instruments();
   if (workflow_->view().asks_for_patient) workflow_->confirm_patient();
+  read_rod_off();
   const host::OperationView view = workflow_->view();
   const bool connected = view.note(LiveStep::connect).done && view.note(LiveStep::calibrate).done;
   if (truth_.at_board(at_s) && view.step == LiveStep::calibrate) return calibrate(view, at_s, now);

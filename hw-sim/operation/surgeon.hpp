@@ -28,6 +28,8 @@ class Surgeon {
 
   /// Looks at the window, and does what is to be done. Ten times a second is enough.
   void act(double at_s, HostTime now, const host::ShownPicture& shown);
+  /// How often Space was pressed in the landmark check, wherever the pointer was.
+  [[nodiscard]] std::size_t presses() const { return presses_; }
   /// How often a landmark was checked, the patient registered, and the CT deformed.
   [[nodiscard]] std::size_t checks() const { return checks_; }
   [[nodiscard]] std::size_t registrations() const { return registrations_; }
@@ -38,7 +40,9 @@ class Surgeon {
   void calibrate(const host::OperationView& view, double at_s, HostTime now);
   void keep_view(const host::OperationView& view, double at_s, HostTime now);
   void deform(const host::OperationView& view, HostTime now);
+  void read_rod_off();
   void check(const host::OperationView& view, double at_s, HostTime now);
+  void press(HostTime now);
   [[nodiscard]] bool points_at_one(double at_s) const;
   void go_to(const Eigen::Vector3d& place_in_patient_mm, double at_s, double rest_s);
   [[nodiscard]] Eigen::Vector3d drawn(double sigma);
@@ -47,7 +51,7 @@ class Surgeon {
   OperationTruth& truth_;
   SurgeonDoes does_;
   std::uint64_t seed_, key_ = 0;
-  std::size_t next_fiducial_ = 0, checks_ = 0, registrations_ = 0, deformations_ = 0;
+  std::size_t next_fiducial_ = 0, presses_ = 0, checks_ = 0, registrations_ = 0, deformations_ = 0;
   double busy_until_s_ = 0, bare_since_s_ = 0, hurries_until_s_ = 0;
   double guided_since_s_ = 0, views_since_s_ = 0;
   bool at_landmark_ = false, matching_ = false;

@@ -187,6 +187,10 @@ MUTANTS = (
            "while (!has_room(lane, waiting_[lane].size(), 0))", "while (!has_room(lane, waiting_[lane].size() - 1, 0))",
            "A queue holds one more than it should.", r"^BoundedQueue\.|^Operation\.AWindowThatStoodStill",
            ("calibration_test",) + OPERATION),
+    Mutant("doubt", "host/operation/live_workflow_doubts.cpp",
+           "  fiducials_.doubt();\n  pointer_ = {};", "  pointer_ = {};",
+           "What speaks against a registration is told, and the overlay goes on.", r"^Referenced\.",
+           ("host_operation_test",)),
     # What no campaign can see: no lock is in it, nor the names of an appliance's disk, nor a queue that holds less, and
     # the latency is none.
     Mutant("folder-fsync", "device/birdseyed/record_file.cpp",
@@ -219,8 +223,4 @@ MUTANTS = (
            "one.scope.camera().width_px == other.scope.camera().width_px;",
            "Another scope's record is taken for the same: a deformation by the former's views is drawn on.",
            r"^OperationWithPictures\.ADeformationIsNotTakenUpWithAnotherScope", OPERATION, False),
-    Mutant("doubt", "host/operation/live_workflow_doubts.cpp",
-           "  fiducials_.doubt();\n  pointer_ = {};", "  pointer_ = {};",
-           "What speaks against a registration is told, and the overlay goes on.", r"^Referenced\.",
-           ("host_operation_test",), False),
 )

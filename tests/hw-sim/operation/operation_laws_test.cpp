@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cstddef>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -200,6 +202,77 @@ TEST(OperationLaws, AWindowThatHasWhatWasTakenBackIsFound) {
   EXPECT_EQ(broken_after(true, false), 1U);
   EXPECT_EQ(broken_after(true, true), 0U) << "somebody registered anew";
   EXPECT_EQ(broken_after(false, false), 0U) << "what was there before may still be on the disk";
+}
+
+TEST(OperationLaws, AWindowThatTakesUpAnotherDeformationIsFound) {
+  const OperationTruth truth(1, 96, 72, Happenings(), false);
+  host::DeformedOrgan organ;
+  organ.field.size = {2, 2, 2};
+  organ.field.displacement_mm.assign(8, Eigen::Vector3f(1, 2, 3));
+  organ.made_utc = "2026-11-26T09:30:00Z";
+  organ.target = host::MotionError{1, 2};
+  organ.target_at_rest_mm = Eigen::Vector3d(30, 35, 20);
+  organ.care = "few places";
+  const auto broken_with = [&](const auto& change, bool with_care = true) {
+    OperationLaws laws(
+        truth, {}, [](std::uint64_t) { return std::nullopt; }, 0);
+    host::OperationView view, none;
+    for (const auto step : {host::LiveStep::connect, host::LiveStep::calibrate})
+      view.notes[static_cast<std::size_t>(step)].done = none.notes[static_cast<std::size_t>(step)].done = true;
+    view.notes[static_cast<std::size_t>(host::LiveStep::fiducials)].done = true;
+    view.fre_mm = 0.5;
+    view.deformed_with_care = true;
+    view.deformed = std::make_shared<const host::DeformedOrgan>(organ);
+    laws.take_kept(view, 0, false, {0});
+    laws.opened(1);
+    laws.take_kept(none, 0, false, {0});
+    host::DeformedOrgan other = organ;
+    change(other);
+    view.deformed = std::make_shared<const host::DeformedOrgan>(other);
+    view.deformed_with_care = with_care;
+    laws.take(view, 1, {1'000'000'000});
+    return laws.broken().size();
+  };
+  EXPECT_EQ(broken_with([](host::DeformedOrgan&) {}), 0U);
+  EXPECT_EQ(broken_with([](host::DeformedOrgan&) {}, false), 1U);
+  EXPECT_EQ(broken_with([](host::DeformedOrgan& other) { other.made_utc = "2026-11-26T09:30:01Z"; }), 1U);
+  EXPECT_EQ(broken_with([](host::DeformedOrgan& other) { other.field.displacement_mm.back().x() += 0.1F; }), 1U);
+  EXPECT_EQ(broken_with([](host::DeformedOrgan& other) {
+              other.field.patient_from_lattice.translate(Eigen::Vector3d(0.1, 0, 0));
+            }),
+            1U);
+  EXPECT_EQ(broken_with([](host::DeformedOrgan& other) { other.target->radius95_mm = 1; }), 1U);
+  EXPECT_EQ(broken_with([](host::DeformedOrgan& other) { other.target.reset(); }), 1U);
+  EXPECT_EQ(broken_with([](host::DeformedOrgan& other) { other.target_at_rest_mm->x() += 1; }), 1U);
+  EXPECT_EQ(broken_with([](host::DeformedOrgan& other) { other.care.clear(); }), 1U);
+}
+
+/// With the same FRE.
+TEST(OperationLaws, ARegistrationThatHasThePatientElsewhereThanBeforeIsFound) {
+  OperationTruth truth(1, 96, 72, Happenings(), false);
+  OperationLaws laws(
+      truth, {}, [](std::uint64_t) { return 1'000'000'000; }, 0);
+  host::ShownPicture shown;
+  shown.any = shown.overlaid = true;
+  shown.strength = 1;
+  const auto broken_by = [&](double fre_mm, double off_mm) {
+    host::OperationView view;
+    view.fre_mm = fre_mm;
+    laws.take_kept(view, 0, false, {0});
+    const Transform<Tracker, Patient> on = truth.tracker_from_patient(1);
+    host::LivePicture picture;
+    picture.set_setup(host::ScopeSetup::of_record(truth.record_of(0))
+                          ->registered({on.rotation(), Eigen::Vector3d(on.translation().array() + off_mm)}),
+                      {});
+    picture.take(wire::VideoFrame(), {HostTime{1'000'000'000}});
+    laws.take(shown, picture, HostTime{1'020'000'000});
+    return laws.broken().size();
+  };
+  EXPECT_EQ(broken_by(0.5, 0), 0U);
+  EXPECT_EQ(broken_by(0.6, 1), 0U) << "another";
+  EXPECT_EQ(broken_by(0.5, 1e-9), 0U);
+  EXPECT_EQ(broken_by(0.5, 0.1), 1U);
+  EXPECT_EQ(laws.broken().front().law, "kept");
 }
 
 }  // namespace
