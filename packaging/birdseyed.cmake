@@ -14,7 +14,8 @@ foreach(page clocks.md decisions/0022-arm64-in-a-sysroot.md decisions/0035-error
     manual/birdseyed.md manual/calibrate-camera.md manual/calibrate-field.md manual/calibrate-hand-eye.md manual/calibrate-latency.md
     manual/calibrate-tip.md manual/calibration-patterns.md manual/calibration-record.md manual/cameras.md manual/embedded.md manual/faults.md manual/frame-socket.md manual/frames.md manual/gpio.md
     manual/minibird.md manual/pairing.md manual/pose-files.md manual/appliance-recording.md manual/serial-lines.md manual/service.md manual/signatures.md manual/simulated-minibird.md manual/simulator.md manual/wire.md
-    manual/examples/poses.cpp manual/examples/poses.py manual/examples/track.py manual/examples/watch.py)
+    manual/examples/average.py manual/examples/board.py manual/examples/poses.cpp manual/examples/poses.py
+    manual/examples/track.py manual/examples/watch.py)
   get_filename_component(folder ${page} DIRECTORY)
   install(FILES ${CMAKE_SOURCE_DIR}/docs/${page} DESTINATION usr/share/doc/birdseyed/${folder} COMPONENT birdseyed)
 endforeach()

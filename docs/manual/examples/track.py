@@ -1,18 +1,21 @@
 #!/usr/bin/env python3
 """Prints poses from a miniBIRD: track.py (tcp:HOST:PORT | /dev/ttyX) COUNT. A whole tracker program in a page."""
-import os, socket, sys
+import os, socket, sys, time
 
 if len(sys.argv) != 3 or not sys.argv[2].isdigit():
     sys.exit("usage: track.py (tcp:HOST:PORT | /dev/ttyX) COUNT")
-where = sys.argv[1]
-try:
-    if where.startswith("tcp:"):
-        host, port = where[4:].rsplit(":", 1)
-        line = socket.create_connection((host, int(port)), 2).makefile("rwb", buffering=0)
-    else:
-        line = open(os.open(where, os.O_RDWR | os.O_NOCTTY), "r+b", buffering=0)
-except (OSError, OverflowError, ValueError) as error:
-    sys.exit("track.py: no tracker at %s (%s)" % (where, error))
+where, line, until = sys.argv[1], None, time.monotonic() + 2
+while line is None:  # the simulator may have been started at the same time
+    try:
+        if where.startswith("tcp:"):
+            host, port = where[4:].rsplit(":", 1)
+            line = socket.create_connection((host, int(port)), 2).makefile("rwb", buffering=0)
+        else:
+            line = open(os.open(where, os.O_RDWR | os.O_NOCTTY), "r+b", buffering=0)
+    except (OSError, OverflowError, ValueError) as error:
+        if time.monotonic() > until or not isinstance(error, OSError):
+            sys.exit("track.py: no tracker at %s (%s)" % (where, error))
+        time.sleep(0.05)
 
 
 def call(what, argument):
