@@ -88,6 +88,7 @@ std::optional<double> look_away_mm(const std::vector<HandEyeStation>& stations) 
   const Eigen::Vector3d meet_mm = solve_symmetric(normal, right);
   if (!nearly_all_have(meet_mm, -1, stations)) return std::nullopt;
   std::vector<double> behind_mm;
+  behind_mm.reserve(stations.size());
   for (const HandEyeStation& s : stations) behind_mm.push_back((*s.camera_from_marker * meet_mm).norm());
   return median_of(std::move(behind_mm));
 }

@@ -272,7 +272,7 @@ Result<bool> RecordingReader::fetch_pixels(wire::VideoFrame& frame, const FrameP
   }
   // The events of a lone sequence were made from it.
   if (sequence_ && lines_.is_open()) {
-    if (const auto pictured = compare(frame, place.index); !pictured || !*pictured) return pictured;
+    if (auto pictured = compare(frame, place.index); !pictured || !*pictured) return pictured;
   }
   auto rgb = sequence_ ? sequence_->read(place.index) : film_->read(place.index);
   if (!rgb && rgb.error().code == Errc::bad_format) return false;

@@ -329,11 +329,11 @@ void RecordingWriter::look_through_folder() {
 
 Result<void> RecordingWriter::finish(const std::string& why) {
   if (auto written = write_measurement(); !written) notes_.push_back(written.error().what);
-  const auto there = files_.check_folder();
+  auto there = files_.check_folder();
   if (!there) damage_.push_back(there.error().what);
   Result<void> ended = end_video();
   if (!ended && there) notes_.push_back(ended.error().what);
-  for (auto synced : {events_.sync(), tracker_.sync()}) {
+  for (const auto& synced : {events_.sync(), tracker_.sync()}) {
     whole_ = whole_ && synced;
     if (!synced) notes_.push_back(synced.error().what);
   }

@@ -150,7 +150,7 @@ Result<void> SequenceWriter::read_header(const OutputFile::Take& take) const {
   std::string head, end;
   calibration::Sha256 fields;
   std::uint64_t at = 0;
-  const auto read = header_.read([&](std::span<const std::uint8_t> bytes) {
+  auto read = header_.read([&](std::span<const std::uint8_t> bytes) {
     const auto until = [&](std::uint64_t place) {
       const auto some =
           bytes.first(static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), place > at ? place - at : 0)));
@@ -176,7 +176,7 @@ Result<void> SequenceWriter::read_header(const OutputFile::Take& take) const {
 
 Result<void> SequenceWriter::read_pixels(const OutputFile::Take& take) const {
   calibration::Sha256 sum;
-  const auto read = pixels_[0].read([&](std::span<const std::uint8_t> bytes) {
+  auto read = pixels_[0].read([&](std::span<const std::uint8_t> bytes) {
     sum.add(bytes);
     return take(bytes);
   });

@@ -67,6 +67,7 @@ Result<void> check_pictures(const std::vector<VideoView>& views, std::span<const
 
 std::vector<CameraModel> cameras_of(const std::vector<VideoView>& views) {
   std::vector<CameraModel> out;
+  out.reserve(views.size());
   for (const VideoView& view : views) out.push_back(view.camera);
   return out;
 }
