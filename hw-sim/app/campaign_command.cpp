@@ -19,7 +19,7 @@ struct CampaignOptions {
   StudiedOperations operations;
   double patience_s = 3600;
   std::vector<std::string> command;
-  bool print = false, alone = false;
+  bool print = false, alone = false, shortest = false;
 };
 
 /// FIRST:LAST, or one number.
@@ -65,6 +65,16 @@ void print(const SeedRun& settings, const StudiedOperations& operations, const O
     fmt::print("birdseye-sim operation --seed SEED --minutes {}{} --shortest prints the fewest faults that break one\n",
                operations.minutes, operations.pictures ? " --pictures" : "");
   }
+  std::fflush(stdout);
+}
+
+/// Of the first seed that broke a law.
+void print_shortest(const SeedRun& settings, const StudiedOperations& operations, std::uint64_t seed) {
+  constexpr Duration kPatience = Duration::from_ms(600'000);
+  const auto script =
+      shortest_script_of(seed, operations, beside_us("birdseye-sim"), settings.folder / "campaign.log", kPatience);
+  fmt::print("the shortest script for seed {}:{}{}", seed, script ? "\n" : " ",
+             script ? *script : script.error().what + "\n");
 }
 
 /// A line, at once.
@@ -74,7 +84,8 @@ void say(std::FILE* where, const std::string& line) {
 }
 
 /// Operations, and their sum.
-Result<void> run_operations(const SeedRun& settings, const StudiedOperations& operations, Ranks* ranks, bool& broken) {
+Result<void> run_operations(const SeedRun& settings, const CampaignOptions& options, Ranks* ranks, bool& broken) {
+  const StudiedOperations& operations = options.operations;
   const auto study = study_of_operations(operations, beside_us("birdseye-sim"));
   if (!study) return study.error();
   const auto results = run_seeds(
@@ -87,6 +98,7 @@ Result<void> run_operations(const SeedRun& settings, const StudiedOperations& op
     return Error{Errc::timeout, "no seed was run to its end, so nothing was judged; give it more time (--at-most)"};
   print(settings, operations, *sum);
   broken = sum->laws_broken > 0;
+  if (options.shortest && sum->first_broken) print_shortest(settings, operations, *sum->first_broken);
   return {};
 }
 
@@ -112,7 +124,7 @@ Result<void> run(const CampaignOptions& options, bool& broken) {
     if (!joined) return joined.error();
     ranks = *std::move(joined);
   }
-  return options.command.empty() ? run_operations(settings, options.operations, ranks.get(), broken)
+  return options.command.empty() ? run_operations(settings, options, ranks.get(), broken)
                                  : run_command(settings, options, ranks.get());
 }
 
@@ -137,12 +149,16 @@ void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
   command.add_flag("--alone", options->alone, "run all seeds here, whatever has started this program beside others");
   command.add_option("--at-most", options->settings.at_most_s, "seconds after which no seed begins")
       ->check(CLI::Range(1.0, 1e6));
+  CLI::Option* const shortest = command.add_flag(
+      "--shortest", options->shortest,
+      "where laws were broken, print the fewest faults that break the first law of the first such seed");
   CLI::Option* const other =
       command
           .add_option("command", options->command,
                       "in place of an operation, after --: prints one line of JSON for the seed that stands for {}")
           ->excludes(minutes)
-          ->excludes(pictures);
+          ->excludes(pictures)
+          ->excludes(shortest);
   command.add_flag("--print", options->print, "print these lines in the end, by seed")->needs(other);
   command
       .add_option("--patience", options->patience_s, "seconds that the command may take for one seed (default 3600)")

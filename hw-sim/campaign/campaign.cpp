@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/record/sha256.hpp"
+#include "drivers/system/child_process.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -29,18 +30,25 @@ Result<std::string> build_of(const std::string& program) {
   return hash.hex().substr(0, kDigits);
 }
 
+/// An operation, told as one line.
+std::vector<std::string> command_of(const std::string& seed, const StudiedOperations& operations,
+                                    const std::string& program) {
+  std::vector<std::string> out{program,     "--end-with-stdin",
+                               "operation", "--line",
+                               "--seed",    seed,
+                               "--minutes", fmt::format("{}", operations.minutes)};
+  if (operations.pictures) out.emplace_back("--pictures");
+  return out;
+}
+
 }  // namespace
 
 Result<SeedStudy> study_of_operations(const StudiedOperations& operations, const std::string& program) {
   const auto build = build_of(program);
   if (!build) return build.error();
   SeedStudy out;
-  out.command = {program,     "--end-with-stdin",
-                 "operation", "--line",
-                 "--seed",    "{}",
-                 "--minutes", fmt::format("{}", operations.minutes),
-                 "--cores",   "1"};
-  if (operations.pictures) out.command.emplace_back("--pictures");
+  out.command = command_of("{}", operations, program);
+  out.command.insert(out.command.end(), {"--cores", "1"});
   out.what = fmt::format("operations of {} minutes{}, build {}", operations.minutes,
                          operations.pictures ? " with pictures" : "", *build);
   out.file = "operations.sqlite";
@@ -63,6 +71,28 @@ Result<SeedStudy> study_of_operations(const StudiedOperations& operations, const
     return result && result->laws_broken > 0;
   };
   return out;
+}
+
+Result<std::string> shortest_script_of(std::uint64_t seed, const StudiedOperations& operations,
+                                       const std::string& program, const std::filesystem::path& log,
+                                       Duration patience) {
+  std::vector<std::string> command = command_of(std::to_string(seed), operations, program);
+  command.emplace_back("--shortest");
+  auto child = ChildProcess::start(command, log, ChildProcess::Pipe::stdout_from_child, ChildProcess::Signals::with_us,
+                                   ChildProcess::Life::ours);
+  if (!child) return child.error();
+  const Deadline deadline = Deadline::after(patience);
+  std::string script;
+  bool is_script = false;  // the first line is the operation's result
+  for (auto line = child->read_line(deadline);; line = child->read_line(deadline)) {
+    if (line && !*line) return Error{Errc::timeout, fmt::format("none was found within {:.0f} s", patience.seconds())};
+    if (!line) break;
+    if (is_script) script += **line + "\n";
+    is_script = true;
+  }
+  if (script.empty())
+    return Error{Errc::degenerate, fmt::format("the operation ended without one; {} may say why", log.string())};
+  return script;
 }
 
 SeedStudy study_of(const std::vector<std::string>& command, Duration patience) {

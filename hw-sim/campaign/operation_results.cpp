@@ -99,6 +99,7 @@ Result<OperationResult> sum_of(const SeedResults& results, std::uint64_t first, 
     for (const auto& [name, count] : kCounts) out.*count += (*one).*count;
     for (const auto& [name, worst] : kWorst) out.*worst = std::max(out.*worst, (*one).*worst);
     out.laws_untold = out.laws_untold || one->laws_untold;
+    if (one->laws_broken > 0 && !out.first_broken) out.first_broken = one->seed;
     if (!one->broken.empty()) out.broken += fmt::format("seed {}: {}\n", one->seed, one->broken);
     return {};
   });

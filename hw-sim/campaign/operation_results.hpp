@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "calibration/base/result.hpp"
@@ -23,9 +24,10 @@ struct OperationResult {
     double slowest_named_s = 0, slowest_over_s = 0;
   };
   std::map<std::string, OfFault> by_fault;
-  std::uint64_t operations = 1;  ///< so many are summed up
-  std::string broken;            ///< in words, a line for each
-  bool laws_untold = false;      ///< laws_broken is the least: an operation may have broken more laws than it tells
+  std::uint64_t operations = 1;               ///< so many are summed up
+  std::string broken;                         ///< in words, a line for each
+  std::optional<std::uint64_t> first_broken;  ///< of many: the first seed whose operation broke a law
+  bool laws_untold = false;  ///< laws_broken is the least: an operation may have broken more laws than it tells
   std::string hash;
 };
 /// An operation tells of no more broken laws than so many.

@@ -46,6 +46,7 @@ TEST(SeedResults, AreReadBackAddedUpAndKeptOncePerSeed) {
   EXPECT_EQ(sum->poses, 600U);
   EXPECT_EQ(sum->minutes, 7.5);
   EXPECT_EQ(sum->laws_broken, 1U);
+  EXPECT_EQ(sum->first_broken, 2U);
   EXPECT_DOUBLE_EQ(sum->worst_circles, 0.3);
   EXPECT_EQ(sum->operations, 3U);
   EXPECT_EQ(words_by_fault(*sum),
@@ -165,6 +166,30 @@ TEST(Campaign, AnOperationThatGivesNoResultBreaksALaw) {
   EXPECT_EQ(said, "1 of 1, 1 broke a law\n");
   EXPECT_EQ(sum->laws_broken, 1U);
   EXPECT_NE(sum->broken.find("seed 1: result: none"), std::string::npos) << sum->broken;
+}
+
+/// A program that answers as `birdseye-sim operation --line --shortest` does where its seed broke a law.
+std::string program_that(const Scratch& scratch, const std::string& does) {
+  const std::string path = scratch.file("operation", "#!/bin/sh\n" + does);
+  std::filesystem::permissions(path, std::filesystem::perms::owner_all);
+  return path;
+}
+
+TEST(Campaign, HasTheShortestScriptOfASeedLookedFor) {
+  const Scratch scratch;
+  const auto asked = [&](const std::string& does, Duration patience) {
+    return shortest_script_of(7, {.minutes = 1.5, .pictures = true}, program_that(scratch, does), scratch / "log",
+                              patience);
+  };
+  const auto found = asked("echo '{}'\necho \"# $*\"\necho '[[fault]]'\nexit 3\n", Duration::from_ms(60'000));
+  ASSERT_TRUE(found) << found.error().what;
+  EXPECT_EQ(*found, "# --end-with-stdin operation --line --seed 7 --minutes 1.5 --pictures --shortest\n[[fault]]\n");
+  const auto none = asked("echo '{}'\nkill -SEGV $$\n", Duration::from_ms(60'000));
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().what.find("ended without one"), std::string::npos) << none.error().what;
+  const auto late = asked("exec sleep 100\n", Duration::from_ms(50));
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().code, Errc::timeout);
 }
 
 /// A study that a shell does: script prints a line for the seed.
