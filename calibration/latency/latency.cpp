@@ -79,13 +79,13 @@ Result<void> overlap(MotionSamples& a, SamplesB& b, double most_offset_s, Latenc
 }
 
 void take_scan(const LagScan& scan, Latency& latency) {
-  latency.correlation = scan.best;
-  latency.lag_s = scan.best_s;
+  latency.correlation = scan.best.correlation;
+  latency.lag_s = scan.best.lag_s;
   latency.at_edge = scan.at_edge;
-  latency.rival_lag_s = scan.rival_s;
-  latency.rival_correlation = scan.rival;
-  latency.far_lag_s = scan.far_s;
-  latency.far_correlation = scan.far;
+  if (scan.rival) latency.rival_lag_s = scan.rival->lag_s;
+  if (scan.rival) latency.rival_correlation = scan.rival->correlation;
+  if (scan.far) latency.far_lag_s = scan.far->lag_s;
+  if (scan.far) latency.far_correlation = scan.far->correlation;
   latency.curves.lag_s = scan.lags_s;
   latency.curves.correlation = scan.correlation;
 }
@@ -103,13 +103,13 @@ std::vector<Sample> covered(const MotionSpline& a, const std::vector<Sample>& b,
 /// At the best lag, and at the rival's where there is one.
 template <typename Sample>
 std::vector<Sample> covered(const MotionSpline& a, const std::vector<Sample>& b, const LagScan& scan) {
-  return covered(a, b, scan.best_s, scan.has_rival ? scan.rival_s : scan.best_s);
+  return covered(a, b, scan.best.lag_s, scan.rival.value_or(scan.best).lag_s);
 }
 
 /// Whether a far peak is high enough to be the truth: that one explains no less than the best within, but for noise.
 bool is_far_rival(const LagScan& scan) {
   constexpr double kNoLess = 0.05;
-  return scan.has_far && scan.far >= scan.best - kNoLess;
+  return scan.far && scan.far->correlation >= scan.best.correlation - kNoLess;
 }
 
 void take_fit(const TimingFit& fit, Latency& latency) {
@@ -145,6 +145,26 @@ bool is_worth_a_fit(const Latency& latency) {
 
 constexpr std::size_t kFewestFitted = 40;
 
+/// By how many standard errors the samples are explained worse at the peak than at the best lag.
+template <typename Sample, typename TimingAt>
+double sigmas_worse_at(const LagPeak& peak, const LagPeak& best, const std::vector<Sample>& samples,
+                       const LatencySettings& settings, const TimingAt& timing_at) {
+  auto near = timing_at(samples, best), other = timing_at(samples, peak);
+  const TimingFit of_near = fit_timing(near, best.lag_s, settings.find_drift);
+  return sigmas_worse(of_near, fit_timing(other, peak.lag_s, settings.find_drift), near.times_s());
+}
+
+/// Of the far peak, over samples of its own, so that it takes none from the fit. Empty where it is no rival, or too few
+/// samples are covered at both lags to tell what it is worth.
+template <typename Sample, typename TimingAt>
+std::optional<double> far_sigmas_of(const MotionSpline& spline, const std::vector<Sample>& of_b, const LagScan& scan,
+                                    const LatencySettings& settings, const TimingAt& timing_at) {
+  if (!is_far_rival(scan)) return std::nullopt;
+  const auto both = covered(spline, of_b, scan.best.lag_s, scan.far->lag_s);
+  if (both.size() < kFewestFitted) return std::nullopt;
+  return sigmas_worse_at(*scan.far, scan.best, both, settings, timing_at);
+}
+
 bool too_few(const std::size_t samples, Latency& latency) {
   latency.determined = false;
   return samples < kFewestFitted;
@@ -178,22 +198,16 @@ Result<Latency> find_latency(std::span<const TimedRotation> a, std::span<const T
   const MotionSamples used = covered(spline, *of_b, scan);
   if (too_few(used.size(), latency) || !is_worth_a_fit(latency)) return latency;
 
-  RotationTiming model(spline, used, scan.turn, scan.best_s);
-  const TimingFit fit = fit_timing(model, scan.best_s, settings.find_drift);
+  const auto timing_at = [&spline](const MotionSamples& samples, const LagPeak& peak) {
+    return RotationTiming(spline, samples, peak.turn, peak.lag_s);
+  };
+  RotationTiming model = timing_at(used, scan.best);
+  const TimingFit fit = fit_timing(model, scan.best.lag_s, settings.find_drift);
   take_fit(fit, latency);
   latency.residual = kDegPerRad * fit.rms;
   latency.b_from_a = model.b_from_a();
-  if (scan.has_rival) {
-    RotationTiming other(spline, used, scan.rival_turn, scan.rival_s);
-    latency.rival_sigmas = sigmas_worse(fit, fit_timing(other, scan.rival_s, settings.find_drift), model.times_s());
-  }
-  if (is_far_rival(scan)) {
-    const auto both = covered(spline, *of_b, scan.best_s, scan.far_s);  // of its own: it takes nothing from the fit
-    if (both.size() < kFewestFitted) return latency;                    // what it is worth cannot be told
-    RotationTiming near(spline, both, scan.turn, scan.best_s), distant(spline, both, scan.far_turn, scan.far_s);
-    const TimingFit of_near = fit_timing(near, scan.best_s, settings.find_drift);
-    latency.far_sigmas = sigmas_worse(of_near, fit_timing(distant, scan.far_s, settings.find_drift), near.times_s());
-  }
+  if (scan.rival) latency.rival_sigmas = sigmas_worse_at(*scan.rival, scan.best, used, settings, timing_at);
+  latency.far_sigmas = far_sigmas_of(spline, *of_b, scan, settings, timing_at);
   return latency;
 }
 
@@ -218,24 +232,18 @@ Result<Latency> find_latency(std::span<const TimedMotionPose> a, std::span<const
   const std::vector<ImageMotion> used = covered(spline, *of_b, scan);
   if (too_few(used.size(), latency) || !is_worth_a_fit(latency)) return latency;
 
-  ImageTiming model(spline, used, scan.best_s);
-  const TimingFit fit = fit_timing(model, scan.best_s, settings.find_drift);
+  const auto timing_at = [&spline](const std::vector<ImageMotion>& samples, const LagPeak& peak) {
+    return ImageTiming(spline, samples, peak.lag_s);
+  };
+  ImageTiming model = timing_at(used, scan.best);
+  const TimingFit fit = fit_timing(model, scan.best.lag_s, settings.find_drift);
   take_fit(fit, latency);
   latency.residual = fit.rms;
   latency.curves.a_s.clear();
   for (const double t : model.times_s()) latency.curves.a_s.push_back(t - fit.offset_s - fit.drift * t);
   latency.curves.a_speed = model.modelled_speeds(fit.offset_s, fit.drift);
-  if (scan.has_rival) {
-    ImageTiming other(spline, used, scan.rival_s);
-    latency.rival_sigmas = sigmas_worse(fit, fit_timing(other, scan.rival_s, settings.find_drift), model.times_s());
-  }
-  if (is_far_rival(scan)) {
-    const auto both = covered(spline, *of_b, scan.best_s, scan.far_s);  // of its own: it takes nothing from the fit
-    if (both.size() < kFewestFitted) return latency;                    // what it is worth cannot be told
-    ImageTiming near(spline, both, scan.best_s), distant(spline, both, scan.far_s);
-    const TimingFit of_near = fit_timing(near, scan.best_s, settings.find_drift);
-    latency.far_sigmas = sigmas_worse(of_near, fit_timing(distant, scan.far_s, settings.find_drift), near.times_s());
-  }
+  if (scan.rival) latency.rival_sigmas = sigmas_worse_at(*scan.rival, scan.best, used, settings, timing_at);
+  latency.far_sigmas = far_sigmas_of(spline, *of_b, scan, settings, timing_at);
   return latency;
 }
 

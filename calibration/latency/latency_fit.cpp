@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/median.hpp"
 #include "calibration/base/student95.hpp"
 
 namespace birdseye::calibration {
@@ -20,13 +21,11 @@ constexpr int kFewestParts = 8, kMostParts = 60;
 
 /// One weight a sample, by the length of its residual.
 Eigen::VectorXd weights_of(const Eigen::VectorXd& lengths) {
-  std::vector<double> sorted(lengths.data(), lengths.data() + lengths.size());
-  const auto middle = sorted.begin() + lengths.size() / 2;
-  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double middle = median_of({lengths.data(), lengths.data() + lengths.size()});
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(lengths.size());
   for (Eigen::Index i = 0; i < lengths.size(); ++i) {
-    if (lengths[i] > kUsual * *middle) weights[i] = kUsual * *middle / lengths[i];
-    if (lengths[i] > kOutlier * *middle && *middle > 0) weights[i] = 0;
+    if (lengths[i] > kUsual * middle) weights[i] = kUsual * middle / lengths[i];
+    if (lengths[i] > kOutlier * middle && middle > 0) weights[i] = 0;
   }
   return weights;
 }

@@ -16,9 +16,9 @@ inline constexpr double kGoodS = 15;
 inline constexpr double kLeastCorrelation = 0.5, kGoodCorrelation = 0.8;
 // A rival lag must explain the streams worse by this many standard errors: in a scan of 200 lags chance reaches 3.
 inline constexpr double kRivalSigmas = 4;
-// Of two correlations: as of peaks that a smaller dip parts, less is no difference. It decides alone only against a
-// best lag that is no answer by itself.
-inline constexpr double kFarBetter = 0.02;
+// Correlations that differ by less are alike: a smaller dip parts no two peaks, and a peak that is higher by less is no
+// better.
+inline constexpr double kAlikeCorrelation = 0.02;
 // Half of the interval. A scope that is led with care turns by 30 deg/s: 2 ms are 0.06 deg, 0.1 mm at 100 mm.
 inline constexpr double kGoodHalfMs = 2, kMostHalfMs = 5;
 // A quartz is within 50 ppm of another; beyond, a clock is wrong or samples are lost.

@@ -7,6 +7,7 @@
 
 #include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/geometry/rotations.hpp"
+#include "calibration/latency/latency_limits.hpp"
 
 namespace birdseye::calibration {
 
@@ -17,8 +18,6 @@ constexpr int kFarStep = 3;               // in kLagStepS: a hand's motion is al
 constexpr Eigen::Index kMostRows = 6000;  // of b: more make no peak clearer
 constexpr double kLeastShare = 0.5;       // of the rows that meet at the lag where most do, for another lag to count
 constexpr Eigen::Index kFewestMeeting = 10;
-// Between two peaks the correlation must dip by so much for them to be two.
-constexpr double kDip = 0.02;
 
 /// Rows longer than one and a half times what 95 % of rows stay under are cut to that: a jump of a tracker is not to
 /// outweigh the recording.
@@ -106,13 +105,11 @@ bool is_peak(const std::vector<double>& c, std::size_t i) {
 void find_rival(LagScan& scan, std::size_t best) {
   const std::vector<double>& c = scan.correlation;
   for (std::size_t i = 0; i < c.size(); ++i) {
-    if (i == best || !is_peak(c, i) || (scan.has_rival && c[i] <= scan.rival)) continue;
+    if (i == best || !is_peak(c, i) || (scan.rival && c[i] <= scan.rival->correlation)) continue;
     const auto from = c.begin() + static_cast<std::ptrdiff_t>(std::min(i, best));
     const auto to = c.begin() + static_cast<std::ptrdiff_t>(std::max(i, best));
-    if (*std::min_element(from, to) > c[i] - kDip) continue;
-    scan.has_rival = true;
-    scan.rival = c[i];
-    scan.rival_s = scan.lags_s[i];
+    if (*std::min_element(from, to) > c[i] - kAlikeCorrelation) continue;
+    scan.rival = LagPeak{scan.lags_s[i], c[i]};
   }
 }
 
@@ -126,22 +123,20 @@ void find_far(LagScan& scan, const std::vector<Scanned>& all, double most_lag_s,
   std::vector<double> c;
   std::size_t best = 0;
   for (const Scanned& one : all) {
-    if (one.lag_s <= scan.best_s) best = c.size();
+    if (one.lag_s <= scan.best.lag_s) best = c.size();
     c.push_back(one.correlation);
   }
   for (std::size_t i = 0; i < c.size(); ++i) {
     if (std::abs(all[i].lag_s) <= most_lag_s || !is_peak(c, i)) continue;
     const auto from = c.begin() + static_cast<std::ptrdiff_t>(std::min(i, best));
     const auto to = c.begin() + static_cast<std::ptrdiff_t>(std::max(i, best));
-    if (*std::min_element(from, to) > c[i] - kDip && c[i] <= scan.best) continue;
+    if (*std::min_element(from, to) > c[i] - kAlikeCorrelation && c[i] <= scan.best.correlation) continue;
     // Between two of the wide steps it may be higher.
     const int middle = static_cast<int>(std::lround(all[i].lag_s / kLagStepS));
     for (int n = middle - kFarStep + 1; n < middle + kFarStep; ++n) {
       const Scanned near = at(n);
-      if (std::abs(near.lag_s) <= most_lag_s || near.correlation <= scan.far) continue;
-      scan.has_far = true;
-      scan.far = near.correlation;
-      scan.far_s = near.lag_s;
+      if (std::abs(near.lag_s) <= most_lag_s || near.correlation <= (scan.far ? scan.far->correlation : 0)) continue;
+      scan.far = LagPeak{near.lag_s, near.correlation};
     }
   }
 }
@@ -178,8 +173,7 @@ LagScan scan_lags(const RateGrid& a, const RateSignal& b, RateMap map, double mo
   }
   const auto top = std::max_element(scan.correlation.begin(), scan.correlation.end());
   const auto best = static_cast<std::size_t>(top - scan.correlation.begin());
-  scan.best_s = scan.lags_s[best];
-  scan.best = *top;
+  scan.best = {scan.lags_s[best], *top};
   scan.at_edge = best == 0 || best + 1 == scan.lags_s.size();
   find_rival(scan, best);
   const auto counted_at = [&](int n) { return counted(at(n)); };
@@ -191,9 +185,10 @@ LagScan scan_lags(const RateGrid& a, const RateSignal& b, RateMap map, double mo
   }
   find_far(scan, all, most_lag_s, counted_at);
   if (map == RateMap::rotation) {
-    if (const auto meeting = meet(clipped_a, clipped_b, scan.best_s)) rotation_correlation(*meeting, &scan.turn);
-    if (const auto meeting = meet(clipped_a, clipped_b, scan.rival_s)) rotation_correlation(*meeting, &scan.rival_turn);
-    if (const auto meeting = meet(clipped_a, clipped_b, scan.far_s)) rotation_correlation(*meeting, &scan.far_turn);
+    for (LagPeak* const peak : {&scan.best, scan.rival ? &*scan.rival : nullptr, scan.far ? &*scan.far : nullptr}) {
+      if (peak == nullptr) continue;
+      if (const auto meeting = meet(clipped_a, clipped_b, peak->lag_s)) rotation_correlation(*meeting, &peak->turn);
+    }
   }
   return scan;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 namespace birdseye::calibration {
@@ -18,18 +19,19 @@ struct RateGrid {
   std::vector<bool> valid;
 };
 
+/// A lag at which the correlation is higher than at those beside it.
+struct LagPeak {
+  double lag_s = 0, correlation = 0;
+  /// With RateMap::rotation: the rotation that brings a's rates to b's.
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+};
+
 struct LagScan {
   std::vector<double> lags_s, correlation;
-  double best_s = 0, best = 0;
+  LagPeak best;
   bool at_edge = false;
-  bool has_rival = false;
-  double rival_s = 0, rival = 0;  ///< the next best peak that a dip parts from the best
-  bool has_far = false;
-  double far_s = 0,
-         far = 0;  ///< the best peak outside of the range, where a dip parts it from the best or it is higher
-  /// With RateMap::rotation: the rotation that brings a's rates to b's, at the best lag, at the rival and at the far
-  /// one.
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity(), rival_turn = turn, far_turn = turn;
+  std::optional<LagPeak> rival;  ///< the next best peak that a dip parts from the best
+  std::optional<LagPeak> far;    ///< the best outside of the range, where a dip parts it from the best or it is higher
 };
 
 /// How b's rates may follow from a's: by a rotation alone, or by any linear map.

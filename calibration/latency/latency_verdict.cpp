@@ -52,12 +52,12 @@ bool is_beyond(const Latency& latency) {
   if (latency.far_correlation < kGoodCorrelation) return false;
   if (latency.far_sigmas) return *latency.far_sigmas <= -kRivalSigmas;
   const bool no_answer = latency.at_edge || latency.correlation < kLeastCorrelation;
-  return no_answer && latency.far_correlation > latency.correlation + kFarBetter;
+  return no_answer && latency.far_correlation > latency.correlation + kAlikeCorrelation;
 }
 
 /// Whether one may explain them as well.
 bool has_far_rival(const Latency& latency) {
-  return latency.far_correlation > 0 && latency.far_correlation >= latency.correlation - kFarBetter &&
+  return latency.far_correlation > 0 && latency.far_correlation >= latency.correlation - kAlikeCorrelation &&
          latency.far_sigmas.value_or(0) < kRivalSigmas;
 }
 

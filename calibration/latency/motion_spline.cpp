@@ -73,10 +73,8 @@ SmoothingSpline::SmoothingSpline(std::span<const double> times_s, const Eigen::M
     const Eigen::SimplicialLDLT<Sparse> solver(normal);
     coefficients_ = solver.solve(Eigen::MatrixXd(design.transpose() * weights.asDiagonal() * values));
     const Eigen::VectorXd off = (values - design * coefficients_).rowwise().norm();
-    std::vector<double> sorted(off.data(), off.data() + rows);
-    std::nth_element(sorted.begin(), sorted.begin() + rows / 2, sorted.end());
     constexpr double kUsual = 2.5;  // medians; beyond, a sample pulls no harder
-    const double limit = kUsual * sorted[static_cast<std::size_t>(rows / 2)];
+    const double limit = kUsual * median_of({off.data(), off.data() + rows});
     for (Eigen::Index i = 0; i < rows; ++i) weights[i] = off[i] > limit && off[i] > 0 ? limit / off[i] : 1;
   }
 }
