@@ -157,8 +157,8 @@ const ModelFit& best_of(const std::vector<ModelFit>& fits) {
     if (std::isfinite(fit.held_out_px) && (rival == nullptr || fit.held_out_px < rival->held_out_px)) rival = &fit;
   }
   // A lens that fits far better and folds is what the views say; one that does not fold and does not fit helps nobody.
-  constexpr double kFarBetter = 0.5;
-  if (best == nullptr || (best_folding != nullptr && best_folding->held_out_px < kFarBetter * best->held_out_px))
+  constexpr double kAlikeCorrelation = 0.5;
+  if (best == nullptr || (best_folding != nullptr && best_folding->held_out_px < kAlikeCorrelation * best->held_out_px))
     return best_folding != nullptr ? *best_folding : fits.front();
   return *best;
 }
@@ -183,7 +183,7 @@ bool matters(const BoardSag& sag, const CameraModel& camera) {
 /// and the distances to the other models' lenses and to that of a bent board.
 void add_doubt(const std::vector<ModelFit>& fits, const ModelFit& best, const ModelFit& fit, CameraCalibration& out) {
   // Few groups tell a spread badly.
-  const double few = student95(static_cast<int>(fit.groups) - 1) / kNormal95;
+  const double few = few_groups_factor(fit.groups);
   CameraVector wider = CameraVector::Ones();
   const CameraVector noise = out.noise_sigma();
   for (Eigen::Index i = 0; i < wider.size(); ++i) {
@@ -258,7 +258,7 @@ CameraCalibration put_together(const ModelFit& fit, const SoundViews& sound,
     add_view(sound.views[v], fit.camera, fit.views[v], fit.held_out_squares_px2[v], out);
     in_order.push_back(fit.views[v]);
   }
-  out.focal_halves = compare_halves(fit.camera, fit.model, in_order);
+  out.focal_halves = focal_halves_of(fit.camera, fit.model, in_order);
   add_covariance(fit, out);
   add_geometry(out);
   add_regions(settings.columns, settings.rows, out);

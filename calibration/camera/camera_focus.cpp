@@ -23,8 +23,8 @@ double focal_of(const CameraModel& camera) {
   return (camera.fx_px + camera.fy_px) / 2;
 }
 
-/// By the residuals, taken for independent.
-double noise_variance(const CameraModel& camera, LensModel model, const std::vector<BundleView>& views) {
+/// The variance of the mean of fx and fy, px^2, if the residuals are independent.
+double focal_variance_px2(const CameraModel& camera, LensModel model, const std::vector<BundleView>& views) {
   std::vector<int> solved;
   for (int i = 0; i < CameraModel::kParameters; ++i) {
     if (solved_by(model)[static_cast<std::size_t>(i)]) solved.push_back(i);
@@ -62,15 +62,15 @@ FocalLength focal_alone(CameraModel camera, LensModel model, std::vector<BundleV
     squares += change_px * change_px;
   }
   constexpr double n = kFocusGroups;
-  const double few = student95(static_cast<int>(kFocusGroups) - 1) / kNormal95;
+  const double few = few_groups_factor(kFocusGroups);
   const double between_px2 = few * few * (n - 1) / n * (squares - sum * sum / n);
-  return {focal_of(camera), std::max(noise_variance(camera, model, views), between_px2)};
+  return {focal_of(camera), std::max(focal_variance_px2(camera, model, views), between_px2)};
 }
 
 }  // namespace
 
-std::optional<FocalHalves> compare_halves(const CameraModel& camera, LensModel model,
-                                          std::span<const BundleView> views) {
+std::optional<FocalHalves> focal_halves_of(const CameraModel& camera, LensModel model,
+                                           std::span<const BundleView> views) {
   const std::size_t half = views.size() / 2;
   if (half < kLeastInHalf) return std::nullopt;
   const FocalLength first = focal_alone(camera, model, {views.begin(), views.begin() + static_cast<long>(half)});

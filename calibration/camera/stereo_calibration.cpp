@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/camera/camera_views.hpp"
 #include "calibration/camera/stereo_bundle.hpp"
@@ -79,10 +80,8 @@ std::vector<double> disagreement_px(const StereoBundle& bundle) {
 void reject_pairs(StereoBundle& bundle, std::span<const PatternView> left_views, StereoCalibration& out) {
   constexpr double kTimes = 5;
   const std::vector<double> off_px = disagreement_px(bundle);
-  std::vector<double> sorted = off_px;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
   const double least_px = 1.0 / 1920 * bundle.right.width_px;  // that much each camera's own pose may be off
-  const double limit_px = kTimes * std::max(sorted[sorted.size() / 2], least_px);
+  const double limit_px = kTimes * std::max(median_of(off_px), least_px);
   std::vector<BundlePair> kept;
   std::vector<std::size_t> kept_pairs;
   for (std::size_t p = 0; p < off_px.size(); ++p) {

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
+#include "calibration/base/median.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/geometry/rotations.hpp"
 #include "calibration/hand_eye/hand_eye_observability.hpp"
@@ -97,11 +99,9 @@ double corner_sigma(const std::vector<PreparedStation>& stations) {
     if (sum) errors.insert(errors.end(), sum->errors_px.begin(), sum->errors_px.end());
   }
   if (errors.empty()) return kLeastCornerSigmaPx;
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
   const double count = 2 * static_cast<double>(errors.size());
   const double for_fit = count / std::max(1.0, count - 6 * static_cast<double>(stations.size()));
-  return std::max(kLeastCornerSigmaPx, *middle / kMedianSigmas * std::sqrt(for_fit));
+  return std::max(kLeastCornerSigmaPx, median_of(std::move(errors)) / kMedianSigmas * std::sqrt(for_fit));
 }
 
 double least_distance(const PatternView& view) {

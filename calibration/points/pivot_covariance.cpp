@@ -87,7 +87,7 @@ double variance_between(const Poses& poses, const Indices& used, const TipEquati
   double squares = 0;
   for (const Eigen::Vector3d& sum : sums) squares += (linear.inverse * sum).squaredNorm();
   const auto count = static_cast<double>(sums.size());
-  const double few = student95(static_cast<int>(sums.size()) - 1) / kNormal95;
+  const double few = few_groups_factor(sums.size());
   return few * few * count / (count - 1) * squares;
 }
 

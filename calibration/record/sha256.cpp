@@ -5,6 +5,8 @@
 #include <array>
 #include <new>
 
+#include "calibration/base/hex.hpp"
+
 namespace birdseye::calibration {
 
 struct Sha256::State {
@@ -31,14 +33,7 @@ std::string Sha256::hex() {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned int bytes = 0;
   if (EVP_DigestFinal_ex(state_->context, digest.data(), &bytes) != 1) throw std::bad_alloc();
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string out;
-  out.reserve(std::size_t{2} * bytes);
-  for (unsigned int i = 0; i < bytes; ++i) {
-    out += kDigits[digest[i] >> 4U];
-    out += kDigits[digest[i] & 15U];
-  }
-  return out;
+  return hex_of(std::span(digest).first(bytes));
 }
 
 std::string sha256_of(std::string_view text) {

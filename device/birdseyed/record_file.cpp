@@ -14,6 +14,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/durable.hpp"
+#include "drivers/system/same_file.hpp"
 #include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::device {
@@ -51,12 +52,11 @@ class DiskFile : public RecordFile {
   /// Whoever has removed the file, or put another in its place, would not find what is written from then on. One that
   /// was moved is still there.
   [[nodiscard]] bool has_its_name() const {
-    struct stat ours {
-    }, there{};
+    struct stat ours = {}, there = {};
     if (::fstat(fd_.get(), &ours) != 0) return true;  // which says nothing of its name
     if (ours.st_nlink == 0) return false;
     if (::lstat(path_.c_str(), &there) != 0) return true;
-    return ours.st_dev == there.st_dev && ours.st_ino == there.st_ino;
+    return is_same_file(ours, there);
   }
 
   UniqueFd fd_;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "calibration/base/picture_size.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/durable.hpp"
 #include "drivers/system/program.hpp"
@@ -84,10 +85,11 @@ constexpr const char* kNoCt = "--ct is missing: name the CT that is to be shown"
 
 Result<void> prepare_window(LiveOptions& options) {
   LiveWindow::Settings& window = options.window;
-  if (std::sscanf(options.size.c_str(), "%dx%d", &window.width_px, &window.height_px) != 2 || window.width_px < 640 ||
-      window.height_px < 480) {
+  const auto size = parse_picture_size(options.size);
+  if (!size || size->width_px < 640 || size->height_px < 480)
     return Error{Errc::bad_value, fmt::format("--size: \"{}\" is no size of at least 640x480", options.size)};
-  }
+  window.width_px = size->width_px;
+  window.height_px = size->height_px;
   window.title = words("window_title");
   window.layout = layout_file();
   return {};
@@ -122,8 +124,10 @@ Result<void> prepare(LiveOptions& options) {
                       static_cast<int>(!options.recording.empty());
   if (sources != 1) return Error{Errc::bad_value, kOneSource};
   if (auto prepared = prepare_window(options); !prepared) return prepared;
-  if (std::sscanf(options.video.c_str(), "%dx%d", &options.cart.width_px, &options.cart.height_px) != 2)
-    return Error{Errc::bad_value, fmt::format("--video: \"{}\" is no size, as 768x576", options.video)};
+  const auto video = parse_picture_size(options.video);
+  if (!video) return Error{Errc::bad_value, fmt::format("--video: \"{}\" is no size, as 768x576", options.video)};
+  options.cart.width_px = video->width_px;
+  options.cart.height_px = video->height_px;
   options.foreign.scope_bird = options.live.scope;
   options.foreign.not_scope = options.live.pointer;
   if (!options.board.empty()) {

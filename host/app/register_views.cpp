@@ -7,9 +7,9 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "calibration/base/median.hpp"
+#include "calibration/base/units.hpp"
 #include "calibration/record/sha256.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/program.hpp"
@@ -43,7 +43,7 @@ struct RegisterViewsOptions {
 /// Shift of the organ's centre, and turn.
 nlohmann::json motion_json(const Transform<Patient, Patient>& motion, const Eigen::Vector3d& centre_mm) {
   return {{"mm", (motion * centre_mm - centre_mm).norm()},
-          {"deg", rotation_log(motion.rotation()).norm() * 180 / std::numbers::pi}};
+          {"deg", rotation_log(motion.rotation()).norm() * kDegPerRad}};
 }
 
 nlohmann::json pose_json(const ViewRegistration& found) {
@@ -119,29 +119,27 @@ void add_further(nlohmann::json& json, const RegistrationCase& c, const ViewRegi
 
 /// What the matches between the views say of the lens, and of the view that agrees least.
 void add_agreement(nlohmann::json& json, const RegistrationCase& c, const ViewAgreement& agreement) {
-  constexpr double kDegrees = 180 / std::numbers::pi;
   json["agreement"] = {{"matches", agreement.matches},
                        {"focal_too_long", agreement.focal.share},
                        {"focal_sigma", agreement.focal.sigma}};
   if (!agreement.odd) return;
   json["agreement"]["odd"] = {{"view", c.views[agreement.odd->view].name},
                               {"eye_off_mm", agreement.odd->off.eye_mm},
-                              {"turned_deg", agreement.odd->off.turn_rad * kDegrees},
+                              {"turned_deg", agreement.odd->off.turn_rad * kDegPerRad},
                               {"others_eye_sigma_mm", agreement.odd->others.eye_mm},
-                              {"others_angle_sigma_deg", agreement.odd->others.angle_rad * kDegrees}};
+                              {"others_angle_sigma_deg", agreement.odd->others.angle_rad * kDegPerRad}};
 }
 
 /// By how much the views' poses were off, and by how much each was moved.
 void add_poses(nlohmann::json& json, const RegistrationCase& c, const AdjustedPoses& adjusted) {
-  constexpr double kDegrees = 180 / std::numbers::pi;
   json["poses"] = {{"matches", adjusted.matches},
                    {"eye_sigma_mm", adjusted.noise.eye_mm},
-                   {"angle_sigma_deg", adjusted.noise.angle_rad * kDegrees}};
+                   {"angle_sigma_deg", adjusted.noise.angle_rad * kDegPerRad}};
   for (std::size_t n = 0; n < c.views.size(); ++n) {
     const Transform<Patient, Camera> given = c.views[n].camera_from_patient.inverse();
     const Transform<Patient, Camera> now = adjusted.camera_from_patient[n].inverse();
     json["per_view"][n]["eye_moved_mm"] = (now.translation() - given.translation()).norm();
-    json["per_view"][n]["turned_deg"] = rotation_log(given.rotation().transpose() * now.rotation()).norm() * kDegrees;
+    json["per_view"][n]["turned_deg"] = rotation_log(given.rotation().transpose() * now.rotation()).norm() * kDegPerRad;
   }
 }
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <random>
 
+#include "calibration/base/units.hpp"
 #include "host/deform/bezier_patch.hpp"
 #include "host/deform/patch_octree.hpp"
 
@@ -92,15 +92,15 @@ CameraModel bench_camera(int width_px, int height_px) {
   CameraModel camera;
   camera.width_px = width_px;
   camera.height_px = height_px;
-  camera.fx_px = camera.fy_px = 0.5 * height_px / std::tan(15 * std::numbers::pi / 180);
+  camera.fx_px = camera.fy_px = 0.5 * height_px / std::tan(15 * kRadPerDeg);
   camera.cx_px = 0.5 * (width_px - 1);
   camera.cy_px = 0.5 * (height_px - 1);
   return camera;
 }
 
 Transform<Camera, Patient> bench_pose(double azimuth_deg) {
-  const double azimuth = azimuth_deg * std::numbers::pi / 180;
-  const double elevation = 30 * std::numbers::pi / 180;
+  const double azimuth = azimuth_deg * kRadPerDeg;
+  const double elevation = 30 * kRadPerDeg;
   const Vector3d away(std::cos(azimuth) * std::cos(elevation), std::sin(azimuth) * std::cos(elevation),
                       std::sin(elevation));
   const Vector3d forward = -away;

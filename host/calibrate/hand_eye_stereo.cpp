@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
+#include "calibration/base/median.hpp"
 #include "host/calibrate/view_pairs.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/text_files.hpp"
@@ -71,13 +73,12 @@ Result<void> check_relation(const HandEyeFiles& files, const calibration::HandEy
     off_px.insert(off_px.end(), distances.begin(), distances.end());
   }
   if (off_px.empty()) return {};
-  const auto middle = off_px.begin() + static_cast<std::ptrdiff_t>(off_px.size() / 2);
-  std::nth_element(off_px.begin(), middle, off_px.end());
-  if (*middle <= kMost * input.right->camera.width_px) return {};
+  const double middle_px = median_of(std::move(off_px));
+  if (middle_px <= kMost * input.right->camera.width_px) return {};
   return Error{Errc::bad_value,
                fmt::format("{}: it puts what the left pictures show {:.0f} px from where the right ones show it: give "
                            "right_from_left, mm, of these two cameras, and see that left and right are not exchanged",
-                           files.right_from_left.string(), *middle)};
+                           files.right_from_left.string(), middle_px)};
 }
 
 }  // namespace birdseye::host

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 
+#include "calibration/base/picture_size.hpp"
 #include "calibration/detect/detect.hpp"
 #include "calibration/picture/field_edge.hpp"
 #include "host/files/name_order.hpp"
@@ -174,11 +175,9 @@ Result<Eigen::Vector2i> size_beside(const fs::path& folder) {
 }
 
 Result<Eigen::Vector2i> size_of(const std::string& text) {
-  Eigen::Vector2i size(0, 0);
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%dx%d%c", &size.x(), &size.y(), &rest) != 2 || size.minCoeff() <= 0)
-    return Error{Errc::bad_value, fmt::format("--size {}: give it as 1920x1080", text)};
-  return size;
+  const auto size = parse_picture_size(text);
+  if (!size) return Error{Errc::bad_value, fmt::format("--size {}: give it as 1920x1080", text)};
+  return Eigen::Vector2i(size->width_px, size->height_px);
 }
 
 }  // namespace

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "calibration/base/median.hpp"
 #include "host/report/axes.hpp"
 #include "host/report/svg.hpp"
 
@@ -24,9 +26,7 @@ double magnification_for(std::span<const PixelResidual> residuals, double units_
     if (const double length = r.residual_px.norm(); std::isfinite(length)) lengths.push_back(length);
   }
   if (lengths.empty()) return 1;
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::nth_element(lengths.begin(), middle, lengths.end());
-  return round_down(kReadable / units_per_px / std::max(*middle, kNothing_px));
+  return round_down(kReadable / units_per_px / std::max(median_of(std::move(lengths)), kNothing_px));
 }
 
 }  // namespace

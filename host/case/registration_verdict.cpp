@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "calibration/base/units.hpp"
 #include "host/registration/geometry/geometry_verdict.hpp"
 
 namespace birdseye::host {
@@ -25,7 +25,7 @@ double widest_deg(const RegistrationCase& c, const ViewRegistration& found) {
   for (const Eigen::Vector3d& a : towards) {
     for (const Eigen::Vector3d& b : towards) least_cosine = std::min(least_cosine, a.dot(b));
   }
-  return std::acos(std::max(-1.0, least_cosine)) * 180 / std::numbers::pi;
+  return std::acos(std::max(-1.0, least_cosine)) * kDegPerRad;
 }
 
 /// No deformation explains views that it was not fitted to better than none does.

@@ -5,14 +5,16 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "calibration/base/median.hpp"
+#include "calibration/base/units.hpp"
 
 namespace birdseye::host {
 
 namespace {
 
 double degrees(double sideways_mm, double forward_mm) {
-  return std::atan2(sideways_mm, forward_mm) * 180 / std::numbers::pi;
+  return std::atan2(sideways_mm, forward_mm) * kDegPerRad;
 }
 
 /// 0 where each step is straight, and the far end lies where a straight stack puts it.
@@ -84,9 +86,7 @@ SliceStack stack_slices(std::vector<DicomSlice> slices, const SliceName& name) {
     return stack;
   }
   // Against the median, which a hole does not move.
-  std::vector<double> sorted = steps;
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  const double usual = sorted[sorted.size() / 2];
+  const double usual = median_of(steps);
   const auto worst = std::max_element(steps.begin(), steps.end(),
                                       [&](double a, double b) { return std::abs(a - usual) < std::abs(b - usual); });
   if (std::abs(*worst - usual) > 0.02 * usual + 0.01) {

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdio>
 
+#include "calibration/base/picture_size.hpp"
 #include "host/volume/patient_box.hpp"
 
 namespace birdseye::host {
@@ -15,12 +15,12 @@ Eigen::Vector3d middle_of(const Volume& volume) {
 
 Result<void> look_from_the_front(RenderScene& scene, const std::string& size, double clip) {
   CameraModel& c = scene.camera;
-  int read = 0;
-  if (std::sscanf(size.c_str(), "%dx%d%n", &c.width_px, &c.height_px, &read) != 2 ||
-      static_cast<std::size_t>(read) != size.size() || c.width_px < 16 || c.height_px < 16 || c.width_px > 8192 ||
-      c.height_px > 8192) {
+  const auto picture = parse_picture_size(size);
+  if (!picture || std::min(picture->width_px, picture->height_px) < 16 ||
+      std::max(picture->width_px, picture->height_px) > 8192)
     return Error{Errc::bad_value, fmt::format("--size {}: give WIDTHxHEIGHT of 16 to 8192 pixels", size)};
-  }
+  c.width_px = picture->width_px;
+  c.height_px = picture->height_px;
   const auto [low, high] = patient_box(scene.volume);
   const Eigen::Vector3d extent = high - low;
   const bool thin = 2 * extent.z() < std::min(extent.x(), extent.y());

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calibration/base/median.hpp"
+#include "calibration/base/units.hpp"
 #include "host/overlay/followed_places.hpp"
 
 namespace birdseye::host {
@@ -16,7 +17,7 @@ constexpr Duration kSpan = Duration::from_ms(200), kGap = Duration::from_ms(130)
 constexpr std::size_t kFewest = 15, kFewestPoses = 10, kMostPoses = 64;
 constexpr double kNear_mm = 60;  // where a place may lie: nearer, a pose's noise has it further off
 constexpr double kSigmas = 4;    // of two axes together: one frame in 3000 by chance, and then it takes a moment only
-constexpr double kTurned_rad = 15 * M_PI / 180;
+constexpr double kTurned_rad = 15 * kRadPerDeg;
 constexpr double kNotModelled = 0.15;  // as VideoMotion has it
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibration/base/median.hpp"
+#include "calibration/base/units.hpp"
 #include "host/overlay/followed_places.hpp"
 
 namespace birdseye::host {
@@ -20,7 +21,7 @@ constexpr Duration kOnTheWayFor = Duration::from_ms(1000);
 constexpr Duration kUnjudged = Duration::from_ms(250);  // without a judged picture: what has moved is not known
 constexpr Duration kAverage = Duration::from_ms(40);    // half the width of what a pose is averaged over
 constexpr std::size_t kFewest = 15;
-constexpr double kTurned_rad = 15 * M_PI / 180;
+constexpr double kTurned_rad = 15 * kRadPerDeg;
 constexpr double kAhead_mm = 100;      // from the camera to what is told of noise
 constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
 constexpr double kPlainly = 3;         // so many times as far off would be plain

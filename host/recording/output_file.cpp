@@ -9,6 +9,8 @@
 #include <cstring>
 #include <vector>
 
+#include "drivers/system/same_file.hpp"
+
 namespace birdseye::host {
 
 namespace fs = std::filesystem;
@@ -87,8 +89,7 @@ Result<void> OutputFile::check(std::uint64_t bytes) const {
   struct stat own = {}, there = {};
   if (::fstat(fd_.get(), &own) != 0) return cannot(path_, errno);
   if (::lstat(path_.c_str(), &there) != 0) return gone_meanwhile(path_);
-  const bool same = own.st_dev == there.st_dev && own.st_ino == there.st_ino;
-  if (!same || static_cast<std::uint64_t>(own.st_size) != bytes) return changed_meanwhile(path_);
+  if (!is_same_file(own, there) || static_cast<std::uint64_t>(own.st_size) != bytes) return changed_meanwhile(path_);
   return {};
 }
 

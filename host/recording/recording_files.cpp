@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "drivers/system/same_file.hpp"
 #include "host/files/files_sha256.hpp"
 #include "host/recording/output_file.hpp"
 #include "host/recording/recording_writer.hpp"
@@ -24,8 +25,7 @@ Result<RecordingFiles> RecordingFiles::open(const fs::path& folder) {
 
 Result<void> RecordingFiles::check_folder() const {
   struct stat own = {}, there = {};
-  const bool same = ::fstat(fd_.get(), &own) == 0 && ::stat(folder_.c_str(), &there) == 0 &&
-                    own.st_dev == there.st_dev && own.st_ino == there.st_ino;
+  const bool same = ::fstat(fd_.get(), &own) == 0 && ::stat(folder_.c_str(), &there) == 0 && is_same_file(own, there);
   if (!same) return gone_meanwhile(folder_);
   return {};
 }

@@ -8,7 +8,9 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
+#include "calibration/base/median.hpp"
 #include "host/volume/components.hpp"
 
 namespace birdseye::host {
@@ -163,9 +165,7 @@ class PostFinder {
     const auto median = [this](double HollowPost::*size) {
       std::vector<double> sizes;
       for (const HollowPost& post : posts_) sizes.push_back(post.*size);
-      const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-      std::nth_element(sizes.begin(), middle, sizes.end());
-      return *middle;
+      return median_of(std::move(sizes));
     };
     const double outer_mm = median(&HollowPost::outer_mm);
     const double cavity_mm = median(&HollowPost::cavity_mm);

@@ -1,8 +1,10 @@
 #include "hw-sim/app/instruments.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
+#include "calibration/base/picture_size.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "hw-sim/app/kept_inputs.hpp"
 #include "hw-sim/faults/fault_script.hpp"
@@ -100,13 +102,12 @@ Result<void> run(VideoOptions& options) {
 }  // namespace
 
 Result<void> parse_size(const std::string& text, int& width_px, int& height_px) {
-  int read = 0;
-  if (std::sscanf(text.c_str(), "%dx%d%n", &width_px, &height_px, &read) == 2 &&
-      static_cast<std::size_t>(read) == text.size() && width_px >= 64 && height_px >= 64 && width_px <= 4096 &&
-      height_px <= 4096) {
-    return {};
-  }
-  return Error{Errc::bad_value, "--size: give WIDTHxHEIGHT of 64 to 4096 pixels, as 768x576"};
+  const auto size = parse_picture_size(text);
+  if (!size || std::min(size->width_px, size->height_px) < 64 || std::max(size->width_px, size->height_px) > 4096)
+    return Error{Errc::bad_value, "--size: give WIDTHxHEIGHT of 64 to 4096 pixels, as 768x576"};
+  width_px = size->width_px;
+  height_px = size->height_px;
+  return {};
 }
 
 namespace {

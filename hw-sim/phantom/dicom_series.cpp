@@ -9,10 +9,10 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
-#include <numbers>
 #include <string>
 #include <system_error>
 
+#include "calibration/base/units.hpp"
 #include "hw-sim/phantom/itk_image.hpp"
 
 namespace birdseye::hw_sim {
@@ -84,7 +84,7 @@ Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid&
       Grid one = grid;
       one.size[2] = 1;
       one.origin_mm = grid.point(0, 0, k);
-      one.origin_mm.y() += std::tan(gantry_tilt_deg * std::numbers::pi / 180) * k * grid.spacing_mm.z();
+      one.origin_mm.y() += std::tan(gantry_tilt_deg * kRadPerDeg) * k * grid.spacing_mm.z();
       const auto slice = image_of<std::int16_t>(one, hu.subspan(grid.index(0, 0, k), one.voxels()));
       itk::MetaDataDictionary& tags = slice->GetMetaDataDictionary();
       const auto put = [&](const char* tag, const std::string& value) {

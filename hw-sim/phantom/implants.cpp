@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "calibration/base/units.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/phantom/shapes.hpp"
 
@@ -56,7 +56,7 @@ class Grower {
     if (across.norm() < 0.1) across = direction.unitOrthogonal();
     across.normalize();
     for (const double side : {1.0, -1.0}) {
-      const double angle = side * uniform(22, 44) * std::numbers::pi / 180;
+      const double angle = side * uniform(22, 44) * kRadPerDeg;
       const Vector3d twist = Eigen::AngleAxisd(uniform(-0.5, 0.5), direction) * across;
       branch(to, Eigen::AngleAxisd(angle, twist) * direction, across, thinner * uniform(0.9, 1.0), depth + 1);
     }
@@ -83,7 +83,7 @@ std::vector<Vector3d> choose_markers(const Body& body, const Vector3d& liver_cen
   for (const Place& place : kPlaces) {
     const double z = std::clamp(liver_centre.z() + place.height_mm, low.z() + 14, high.z() - 14);
     const Vector3d axis(0.5 * (low.x() + high.x()), 0.5 * (low.y() + high.y()), z);
-    const double angle = place.angle_deg * std::numbers::pi / 180;
+    const double angle = place.angle_deg * kRadPerDeg;
     const Vector3d outward(std::sin(angle), -std::cos(angle), 0);
     const Vector3d touch = march_to_level(body.skin_mm, 0, axis + 320 * outward, -outward, 320);
     const Vector3d normal = gradient(body.skin_mm, touch, 2.0).normalized();

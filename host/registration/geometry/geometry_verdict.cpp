@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "calibration/base/median.hpp"
+#include "calibration/base/units.hpp"
 #include "host/registration/geometry/pose_adjustment.hpp"
 
 namespace birdseye::host {
@@ -106,13 +106,12 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
   }
   if (found.agreement && found.agreement->odd) {
     const OddView& odd = *found.agreement->odd;
-    constexpr double kDegrees = 180 / std::numbers::pi;
     return {Grade::fail,
             {fmt::format("{} does not agree with the other views, which put it {:.1f} mm and {:.1f} degrees from where "
                          "its pose has it, while their own poses err by {:.1f} mm and {:.1f} degrees along each axis: "
                          "check its pose and its camera's file, or leave this view out",
-                         views[odd.view].name, odd.off.eye_mm, odd.off.turn_rad * kDegrees, odd.others.eye_mm,
-                         odd.others.angle_rad * kDegrees)},
+                         views[odd.view].name, odd.off.eye_mm, odd.off.turn_rad * kDegPerRad, odd.others.eye_mm,
+                         odd.others.angle_rad * kDegPerRad)},
             {}};
   }
   if (found.adjusted && found.adjusted->noise.eye_mm >= kMostPoseNoise.eye_mm) {

@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <numbers>
+
+#include "calibration/base/units.hpp"
 
 namespace birdseye::host {
 
 namespace {
-
-constexpr double kDegree = std::numbers::pi / 180;
 
 /// How far matches are looked for, and by how much poses may err there.
 struct Reach {
@@ -72,7 +71,7 @@ std::optional<PoseAdjustment> adjusted_poses(const std::vector<PinholeView>& vie
                                              std::span<const TextureMatch> matches, const PoseNoise& widest) {
   constexpr std::size_t kFewest = 40;
   constexpr double kLeastShare = 0.4;
-  constexpr PoseNoise kNarrowest{0.02, 0.005 * kDegree};
+  constexpr PoseNoise kNarrowest{0.02, 0.005 * kRadPerDeg};
   constexpr std::array kScales{64.0, 16.0, 8.0, 4.0, 2.0};
   if (views.size() < 2 || matches.size() < kFewest) return std::nullopt;
   PoseBundle bundle(views, matches);

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <numbers>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "calibration/base/units.hpp"
 #include "host/registration/geometry/pose_bundle.hpp"
 #include "host/registration/geometry/texture_matches.hpp"
 #include "host/registration/views/view_registration.hpp"
@@ -18,10 +18,10 @@ struct PoseAdjustment {
 };
 
 /// The most that poses err by which a cart averages.
-inline constexpr PoseNoise kUsualPoseNoise{2, 0.5 * std::numbers::pi / 180};
+inline constexpr PoseNoise kUsualPoseNoise{2, 0.5 * kRadPerDeg};
 /// The most that poses may err by and be corrected: those of single records of a tracker, far from the lens. Eyes that
 /// seem to be off by as much were not corrected rightly; of angles that was not found so.
-inline constexpr PoseNoise kMostPoseNoise{4, 0.6 * std::numbers::pi / 180};
+inline constexpr PoseNoise kMostPoseNoise{4, 0.6 * kRadPerDeg};
 
 /// Moves the views until the matches agree: a bundle adjustment whose points lie on the first view's rays, with
 /// Cauchy's loss, annealed, and a prior on each pose whose width is found from how far the views have to move. An error

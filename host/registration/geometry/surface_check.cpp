@@ -9,6 +9,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "calibration/base/median.hpp"
 #include "calibration/picture/picture_mat.hpp"
 #include "host/registration/geometry/outlines.hpp"
 #include "host/registration/similarity/overlap_mask.hpp"
@@ -58,12 +59,6 @@ std::vector<Test> tests_of_texture(const CheckedPlaces& places, const CheckError
   return out;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::vector<Test> tests_of_outline(const CheckedPlaces& places, const CheckErrors& errors) {
   constexpr double kOwn_mm = 0.3, kTogether = 4;  ///< neighbours that err alike
   constexpr double kOfMedian = 1.2533, kHalfAreBelow = 0.6745;
@@ -79,8 +74,8 @@ std::vector<Test> tests_of_outline(const CheckedPlaces& places, const CheckError
     if (signed_mm.size() < kLeastOutlinePart) continue;
     const double own_mm = kOfMedian * kOwn_mm / std::sqrt(static_cast<double>(signed_mm.size()) / kTogether);
     const double sigma_mm = std::hypot(own_mm, errors.pose_mm, errors.surface_mm);
-    out.push_back({part, std::abs(median(std::move(signed_mm))), sigma_mm, 1, 0});
-    out.push_back({part, median(std::move(sizes_mm)), sigma_mm, 1, kHalfAreBelow * kOwn_mm});
+    out.push_back({part, std::abs(median_of(std::move(signed_mm))), sigma_mm, 1, 0});
+    out.push_back({part, median_of(std::move(sizes_mm)), sigma_mm, 1, kHalfAreBelow * kOwn_mm});
   }
   return out;
 }

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <numbers>
 
+#include "calibration/base/units.hpp"
 #include "host/registration/geometry/pose_adjustment.hpp"
 #include "host/registration/geometry/pose_bundle.hpp"
 
@@ -11,11 +11,10 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kScale = 2;  ///< of Cauchy's loss, in standard deviations of a match
-constexpr PoseNoise kNarrowest{0.02, 0.005 * kDegree};
+constexpr PoseNoise kNarrowest{0.02, 0.005 * kRadPerDeg};
 /// Wider than poses are thought to err where they are adjusted: what is wrong here is to show.
-constexpr PoseNoise kWidest{8, 2 * kDegree};
+constexpr PoseNoise kWidest{8, 2 * kRadPerDeg};
 
 /// Solves the bundle, and finds how far poses err by it. Starts from noise.
 PoseNoise solved(PoseBundle& bundle, PoseNoise noise) {
@@ -35,7 +34,7 @@ PoseNoise solved(PoseBundle& bundle, PoseNoise noise) {
 /// err. Nothing is said of a view with few matches, and where the others do not agree among themselves either.
 std::optional<OddView> odd_view(const std::vector<PinholeView>& given, std::span<const TextureMatch> matches,
                                 const PoseNoise& noise) {
-  constexpr double kDeviations = 8, kLeastEye_mm = 2, kLeastTurn_rad = kDegree;
+  constexpr double kDeviations = 8, kLeastEye_mm = 2, kLeastTurn_rad = kRadPerDeg;
   constexpr std::size_t kFewest = 20;
   std::optional<OddView> out;
   double most = kDeviations;
@@ -60,7 +59,7 @@ std::optional<OddView> odd_view(const std::vector<PinholeView>& given, std::span
 std::optional<ViewAgreement> view_agreement(const std::vector<PinholeView>& given,
                                             std::span<const TextureMatch> matches) {
   constexpr std::size_t kFewest = 40, kFewestViews = 3;
-  constexpr PoseNoise kStart{1, 0.25 * kDegree};
+  constexpr PoseNoise kStart{1, 0.25 * kRadPerDeg};
   constexpr double kFocalSigma = 0.2;
   if (given.size() < 2 || matches.size() < kFewest) return std::nullopt;
   ViewAgreement out;
