@@ -74,7 +74,7 @@ struct FieldFit {
   std::string worst;                               ///< its name
   std::optional<double> before_deg, held_out_deg;  ///< RMS, where orientation was mapped
   double mapped_part = 0;                          ///< of the box about the places, 0..1
-  double sigma95_mm = 0;                           ///< the map's own sigma: 95 % of what is mapped has less
+  std::optional<double> sigma95_mm;  ///< the map's own sigma: 95 % of what is mapped has less; empty: nothing is
   std::optional<Transform<Tracker, Marker>> tracker_from_board;
   /// Grid: how much longer the tracker has distances than the board, as a factor, and along each of the board's axes.
   /// Pairs: 1.

@@ -143,7 +143,7 @@ std::string unit_of(double mm_per_unit) {
 namespace {
 
 // The error of the best published corrections of such trackers, and what an overlay may still be off by at all.
-constexpr double kMapPassMm = 1.0, kMapMarginalMm = 2.5;
+constexpr double kMapPassMm = 1.0, kMapMarginalMm = FieldMap::kMostSigmaMm;
 // Pairs carry the noise of two sensors that move, and of their orientations.
 constexpr double kPairPassMm = 2.0, kPairMarginalMm = 4.0;
 // Metal bends a field, and stretches all of it by hardly a hundredth.
@@ -152,7 +152,7 @@ constexpr double kWorstFactor = 5;   // of the RMS; beyond it one region is not 
 constexpr double kLittleGain = 0.9;  // of the error before: the map takes away next to nothing
 constexpr double kFewOutliers = 0.1, kManyOutliers = 0.25;
 constexpr double kMostlyMapped = 0.6, kHardlyMapped = 0.1;  // of the box
-// A place at the rim is known less well than those that were held out. Beyond detail::kMostSigmaMm it is not mapped.
+// A place at the rim is known less well than those that were held out. Beyond FieldMap::kMostSigmaMm it is not mapped.
 constexpr double kSigmaPassMm = 1.5;
 constexpr double kLeastDirectionSpread = 0.02;  // a body that is turned by 30 deg about two axes has 0.06
 
@@ -289,13 +289,15 @@ Verdict verdict_of(const FieldFit& fit) {
                 "if the error before is small enough, work without a map");
   }
   judge_outliers(fit, verdict);
-  verdict.judge("the map's own sigma, in 95 % of what is mapped,", fit.sigma95_mm, "mm", kSigmaPassMm,
-                detail::kMostSigmaMm, "measure more places, and at more levels, where poses will be");
+  if (fit.sigma95_mm) {
+    verdict.judge("the map's own sigma, in 95 % of what is mapped,", *fit.sigma95_mm, "mm", kSigmaPassMm,
+                  FieldMap::kMostSigmaMm, "measure more places, and at more levels, where poses will be");
+  }
   if (fit.mapped_part < kMostlyMapped) {
     verdict.add(fit.mapped_part < kHardlyMapped ? Grade::fail : Grade::marginal,
                 fmt::format("only {:.0f} % of the box around the samples is mapped: elsewhere nothing was measured "
                             "nearby, or the map is not sure to {:.1f} mm",
-                            100 * fit.mapped_part, detail::kMostSigmaMm),
+                            100 * fit.mapped_part, FieldMap::kMostSigmaMm),
                 "measure where the report shows gaps: poses there will be doubted");
   }
   if (fit.from_pairs) {

@@ -54,15 +54,12 @@ struct FoldedNormals {
 
 inline constexpr double kSmoothings[] = {1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1};
 
-// What an overlay may be off by at all (the limit of a map that is marginal): a pose that the map may move by a larger
-// error is no better than one without a map, and is not published.
-inline constexpr double kMostSigmaMm = 2.5;
-
 /// Where a node of the lattice of sigmas lies.
 Eigen::Vector3d place_of_node(const FieldFunctions& box, std::size_t node);
 
 /// The lattice of sigmas: at each node, `at(place)`, or -1 where no place is within reach, and where the map itself is
-/// not sure to kMostSigmaMm: at places that lie side by side and yet do not tell how the field bends between them.
+/// not sure to FieldMap::kMostSigmaMm: at places that lie side by side and yet do not tell how the field bends between
+/// them.
 template <typename At>
 std::vector<double> sigma_lattice(const FieldFunctions& box, std::span<const Eigen::Vector3d> places_mm,
                                   double reach_mm, const At& at) {
@@ -73,7 +70,7 @@ std::vector<double> sigma_lattice(const FieldFunctions& box, std::span<const Eig
     double nearest = 1e300;
     for (const Eigen::Vector3d& p : places_mm) nearest = std::min(nearest, (p - place).squaredNorm());
     const double sigma_mm = nearest <= reach_mm * reach_mm ? at(place) : -1;
-    out.push_back(sigma_mm <= kMostSigmaMm ? sigma_mm : -1);
+    out.push_back(sigma_mm <= FieldMap::kMostSigmaMm ? sigma_mm : -1);
   }
   return out;
 }

@@ -158,7 +158,7 @@ std::optional<double> FieldMap::sigma_mm(const Eigen::Vector3d& position_mm) con
 }
 
 std::optional<Eigen::Vector3d> FieldMap::correction_mm(const Eigen::Vector3d& position_mm) const {
-  if (!sigma_mm(position_mm)) return std::nullopt;
+  if (const auto sigma = sigma_mm(position_mm); !sigma || *sigma > kMostSigmaMm) return std::nullopt;
   std::array<double, FieldFunctions::kMost> values;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled next
   data_.functions.evaluate(position_mm, values);
   return sum_of(data_.position_mm, values);
@@ -167,7 +167,7 @@ std::optional<Eigen::Vector3d> FieldMap::correction_mm(const Eigen::Vector3d& po
 std::optional<FieldMap::Corrected> FieldMap::correct(const Transform<Tracker, Sensor>& measured) const {
   const Eigen::Vector3d& p = measured.translation();
   const auto sigma = sigma_mm(p);
-  if (!sigma) return std::nullopt;
+  if (!sigma || *sigma > kMostSigmaMm) return std::nullopt;
   std::array<double, FieldFunctions::kMost> values;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled next
   data_.functions.evaluate(p, values);
   Eigen::Matrix3d rotation = measured.rotation();
@@ -176,8 +176,12 @@ std::optional<FieldMap::Corrected> FieldMap::correct(const Transform<Tracker, Se
 }
 
 std::string FieldMap::why_not(const Eigen::Vector3d& position_mm) const {
-  if (sigma_mm(position_mm)) return "";
   const Eigen::Vector3d& p = position_mm;
+  if (const auto sigma = sigma_mm(p)) {
+    if (*sigma <= kMostSigmaMm) return "";
+    return fmt::format("at {:.0f}, {:.0f}, {:.0f} mm the map of the field is sure to {:.1f} mm, of at most {:.1f}",
+                       p.x(), p.y(), p.z(), *sigma, kMostSigmaMm);
+  }
   const FieldFunctions& box = data_.functions;
   if (inside(box, p))
     return fmt::format("the field was not mapped near {:.0f}, {:.0f}, {:.0f} mm", p.x(), p.y(), p.z());

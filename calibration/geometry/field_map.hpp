@@ -59,19 +59,23 @@ struct FieldMapData {
 /// extrapolated.
 class FieldMap {
  public:
+  /// What an overlay may be off by at all: a pose that the map may move by a larger error is no better than one without
+  /// a map. Maps of version 0.1 have such places.
+  static constexpr double kMostSigmaMm = 2.5;
+
   static Result<FieldMap> from(FieldMapData data);
 
   struct Corrected {
     Transform<Tracker, Sensor> tracker_from_sensor;
     double sigma_mm;  ///< RMS in space, of the position
   };
-  /// Empty where the field was not mapped.
+  /// Empty where the field was not mapped, or is not known to kMostSigmaMm.
   [[nodiscard]] std::optional<Corrected> correct(const Transform<Tracker, Sensor>& measured) const;
-  /// c(p), mm, wherever it is mapped.
+  /// c(p), mm, where correct() gives a pose.
   [[nodiscard]] std::optional<Eigen::Vector3d> correction_mm(const Eigen::Vector3d& position_mm) const;
   /// Empty where the field was not mapped: outside the box, and inside it where nothing was measured nearby.
   [[nodiscard]] std::optional<double> sigma_mm(const Eigen::Vector3d& position_mm) const;
-  /// Why there is no correction at a place, in words; empty where there is one.
+  /// Why correct() gives nothing at a place, in words; empty where it gives a pose.
   [[nodiscard]] std::string why_not(const Eigen::Vector3d& position_mm) const;
   [[nodiscard]] bool maps_orientation() const { return !data_.rotation_rad.empty(); }
   [[nodiscard]] const FieldMapData& data() const { return data_; }

@@ -115,7 +115,7 @@ nlohmann::json json_of(const Fitted& fitted) {
                       {"order", fit.chosen.order},
                       {"smoothing", fit.chosen.smoothing},
                       {"mapped_percent", 100 * fit.mapped_part},
-                      {"sigma95_mm", fit.sigma95_mm},
+                      {"sigma95_mm", fit.sigma95_mm ? nlohmann::json(*fit.sigma95_mm) : nlohmann::json()},
                       {"orientation_mapped", fit.map.maps_orientation()},
                       {"measurements", fit.residuals.size()},
                       {"not_counted", std::ranges::count_if(fit.residuals, [](const auto& r) { return r.beyond; })},

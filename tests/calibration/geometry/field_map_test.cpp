@@ -107,6 +107,22 @@ TEST(FieldMap, ACellWithANodeThatWasNotMappedHasNoAnswer) {
   EXPECT_NE(map->why_not({345, 30, 120}).find("not mapped near 345, 30, 120 mm"), std::string::npos);
 }
 
+TEST(FieldMap, NothingIsCorrectedWhereTheMapIsNotSure) {
+  FieldMapData data = constant_map(FieldBasis::polynomial, 2);
+  data.sigma_mm.assign(9 * 9 * 9, 2.6);
+  for (std::size_t z = 0; z < 9; ++z) data.sigma_mm[z * 81] = 2.4;  // along the edge x = 100, y = -200
+  const auto map = FieldMap::from(data);
+  ASSERT_TRUE(map) << map.error().what;
+  const Eigen::Vector3d sure(100, -200, 60), unsure(300, 0, 100);
+  EXPECT_TRUE(map->correct({Eigen::Matrix3d::Identity(), sure}));
+  EXPECT_TRUE(map->correction_mm(sure));
+  EXPECT_EQ(map->why_not(sure), "");
+  EXPECT_FALSE(map->correct({Eigen::Matrix3d::Identity(), unsure}));
+  EXPECT_FALSE(map->correction_mm(unsure));
+  EXPECT_EQ(map->sigma_mm(unsure), 2.6);
+  EXPECT_EQ(map->why_not(unsure), "at 300, 0, 100 mm the map of the field is sure to 2.6 mm, of at most 2.5");
+}
+
 TEST(FieldMap, SigmaIsInterpolated) {
   FieldMapData data = constant_map(FieldBasis::polynomial, 1);
   for (std::size_t i = 0; i < data.sigma_mm.size(); ++i) data.sigma_mm[i] = 1 + static_cast<double>(i % 9) / 8;
