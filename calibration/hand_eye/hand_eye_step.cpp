@@ -32,8 +32,8 @@ Step step_of(const ChainNormal& all, const Eigen::MatrixXd& inverse, const Chain
   const Vector6d gradient = after.gradient.segment<6>(first_parameter) - shared * inverse * all.gradient;
   const Matrix6d information =
       after.information.block<6, 6>(first_parameter, first_parameter) - shared * inverse * shared.transpose();
-  // What all stations' fit takes of a direction but for so little is rounding. Turns and shifts are brought to one
-  // scale.
+  // What is left of a direction after the fit of all stations, where that is so little, is rounding. Turns and shifts
+  // are brought to one scale.
   constexpr double kRounding = 1e-9;
   const Vector6d scale = after.information.diagonal().segment<6>(first_parameter).cwiseSqrt();
   const Vector6d unit = scale.unaryExpr([](double s) { return s > 0 ? 1 / s : 0; });

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "calibration/record/record_words.hpp"
+
 namespace birdseye::calibration {
 
 std::optional<IdentityDifference> first_difference(const Identity& recorded, const Identity& told) {
@@ -15,9 +17,8 @@ std::optional<IdentityDifference> first_difference(const Identity& recorded, con
 
 std::string misfit(const std::string& what, const Identity& recorded, const Identity& told, const std::string& of) {
   if (recorded.empty())
-    return fmt::format(
-        "{} does not say which {} it was made with; bind it to this one: birdseye calibrate record FILE --bind HOST",
-        of, what);
+    return fmt::format("{} does not say which {} it was made with; bind it to this one: {} HOST", of, what,
+                       kBindCommand);
   const auto other = first_difference(recorded, told);
   if (!other) return {};
   if (other->told.empty())

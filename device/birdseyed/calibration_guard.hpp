@@ -14,7 +14,7 @@ namespace birdseye::device {
 class CalibrationGuard {
  public:
   /// record: a calibration record as record_text() makes it; empty: there is none. A record that cannot be read is
-  /// never in force. refused: why this one is not used, whatever is here; empty: it may be.
+  /// never in force. refused: why this one is not used with any instrument; empty: it may be.
   explicit CalibrationGuard(const std::string& record, const std::string& refused = "");
 
   void note(const InstrumentChanged& changed);

@@ -9,10 +9,12 @@
 
 #include "calibration/record/calibration_record.hpp"
 #include "calibration/record/field_map_file.hpp"
+#include "calibration/record/record_words.hpp"
 #include "device/birdseyed/config_checks.hpp"
 #include "device/birdseyed/config_section.hpp"
 #include "device/birdseyed/wire_admission.hpp"
-#include "device/wire/server.hpp"
+#include "device/wire/igtl_bytes.hpp"
+#include "device/wire/tcp_link.hpp"
 #include "drivers/identity/identity_folder.hpp"
 #include "drivers/identity/this_machine.hpp"
 #include "drivers/io/serial_port.hpp"
@@ -191,7 +193,7 @@ void read_gpio(ConfigSection& section, Config& config) {
 void read_wire(ConfigSection& section, Config& config) {
   section.text("bind", config.wire.bind);
   section.integer("port", config.wire.port, 0, 65535);
-  if (const std::string fault = fault_of_bind(config.wire.bind); !fault.empty()) section.fail("bind", fault);
+  if (const std::string fault = wire::fault_of_bind(config.wire.bind); !fault.empty()) section.fail("bind", fault);
   section.flag("allow_plain", config.wire.allow_plain);
   config.core.notice = plain_notice(config.wire);
   section.flag("transforms", config.core.transforms);
@@ -199,8 +201,8 @@ void read_wire(ConfigSection& section, Config& config) {
   for (const std::string& bird : std::set(config.core.bird_names.begin(), config.core.bird_names.end())) {
     if (!config.core.transforms || devices.insert(wire::transform_device(bird)).second) continue;
     section.fail("transforms", fmt::format("two birds' TRANSFORMs would both be called {}: give the birds names that "
-                                           "differ in their first 11 letters, or set transforms = false",
-                                           wire::transform_device(bird)));
+                                           "differ in their first {} bytes, or set transforms = false",
+                                           wire::transform_device(bird), wire::kMostTransformNameBytes));
   }
 }
 
@@ -291,12 +293,14 @@ void read_field_map(const std::string& path, bool accept_unsigned, ConfigSection
 std::string delay_refusal(const std::string& path, const calibration::LatencyEntry& latency,
                           const std::optional<Duration>& delay) {
   constexpr double kSame_ms = 0.05;  // people write one decimal
-  const double now_ms = delay ? delay->seconds() * 1e3 : 0;
-  if (!latency.camera_delay_ms || std::abs(*latency.camera_delay_ms - now_ms) <= kSame_ms) return {};
+  if (!latency.camera_delay_ms) return {};
+  // Where it is not set half a period is taken off, which is another time than 0.
+  if (delay && std::abs(*latency.camera_delay_ms - delay->seconds() * 1e3) <= kSame_ms) return {};
   return fmt::format(
-      "{}: the record's latency was measured with [camera] delay_ms = {:g}, which is {} now; set it back, or measure "
-      "again by birdseye calibrate latency --record",
-      path, *latency.camera_delay_ms, delay ? fmt::format("{:g}", now_ms) : "not set");
+      "{}: {} [camera] delay_ms = {:g}, which is {} now; set it back, or measure again by birdseye calibrate latency "
+      "--record",
+      path, calibration::kOfAnotherDelay, *latency.camera_delay_ms,
+      delay ? fmt::format("{:g}", delay->seconds() * 1e3) : "not set");
 }
 
 /// What the appliance will say once the instruments run.

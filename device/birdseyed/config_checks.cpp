@@ -1,6 +1,5 @@
 #include "device/birdseyed/config_checks.hpp"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <sys/un.h>
 
@@ -44,16 +43,6 @@ std::string fault_of_socket(const std::string& value, const std::string& kind) {
   if (!value.starts_with(kind) || value.size() - kind.size() <= kMostPathBytes) return {};
   return fmt::format("a socket's path has at most {} bytes, and this one has {}; give a shorter one", kMostPathBytes,
                      value.size() - kind.size());
-}
-
-std::string fault_of_bind(const std::string& address) {
-  constexpr unsigned kFirstOfGroups = 224;  // from here on multicast, reserved and broadcast
-  in_addr read{};
-  if (::inet_pton(AF_INET, address.c_str(), &read) != 1)
-    return fmt::format("\"{}\": give an IPv4 address of this machine, as 127.0.0.1", address);
-  if (ntohl(read.s_addr) >> 24U >= kFirstOfGroups)
-    return fmt::format("\"{}\" is no machine's but that of many; give an IPv4 address of this machine", address);
-  return {};
 }
 
 std::string fault_of_folder(const std::filesystem::path& folder) {

@@ -10,7 +10,6 @@ namespace birdseye::device {
 std::string fault_of_bird_names(const std::vector<std::string>& names);
 /// Of a socket's path, where the value begins with `kind`, as "socket:"; of any other value nothing.
 std::string fault_of_socket(const std::string& value, const std::string& kind);
-std::string fault_of_bind(const std::string& address);
 /// Of a folder that is there, or will be made.
 std::string fault_of_folder(const std::filesystem::path& folder);
 

@@ -20,9 +20,6 @@ constexpr Duration kDoubtToldEvery = Duration::from_ms(1000);
 constexpr Duration kDoubtInStatusAfter = Duration::from_ms(100);  // a record that is lost now and then is none of it
 constexpr Duration kClockFaultStays = Duration::from_ms(1000);    // after the last frame that shows it
 constexpr Duration kClockFaultToldEvery = Duration::from_ms(10'000);
-// What `calibrate field` maps at most: a pose that may be off by more is no better than one without a map. Maps that
-// were made before that limit have such places.
-constexpr double kMostFieldSigmaMm = 2.5;
 constexpr std::size_t kMostWaitingFrames = 16;  // 100 MB of 1080p, and over a quarter of a second
 
 void add(MiniBirdCounters& sum, const MiniBirdCounters& more) {
@@ -123,14 +120,7 @@ BirdReading Core::corrected(const BirdReading& reading) {
     return out;
   }
   const auto corrected = settings_.field->correct({*pose->rotation, *pose->position_mm});
-  if (corrected && !(corrected->sigma_mm <= kMostFieldSigmaMm)) {
-    ++unmapped_;
-    out.pose.reset();
-    const Eigen::Vector3d& p = *pose->position_mm;
-    out.doubt = fmt::format("at {:.0f}, {:.0f}, {:.0f} mm the map of the field is sure to {:.1f} mm, of at most {:.1f}",
-                            p.x(), p.y(), p.z(), corrected->sigma_mm, kMostFieldSigmaMm);
-    out.kind = DoubtKind::unmapped;
-  } else if (corrected) {
+  if (corrected) {
     out.pose->rotation = corrected->tracker_from_sensor.rotation();
     out.pose->position_mm = corrected->tracker_from_sensor.translation();
   } else {

@@ -26,7 +26,7 @@ struct CoreSettings {
   FrameClock::Settings frame_clock;
   std::string notice;                          ///< said in STATUS beside what is amiss, of which it is none
   std::string calibration;                     ///< a calibration record's text; empty: none
-  std::string calibration_refused;             ///< why it is not used, whatever is here; empty: it may be
+  std::string calibration_refused;             ///< why it is not used with any instrument; empty: it may be
   std::optional<calibration::FieldMap> field;  ///< corrects every pose; poses outside the mapped volume are doubted
   calibration::Identity field_of;  ///< the tracker whose field that is; of another every pose is doubted. Empty: any
   std::string field_refused;       ///< why the map is not used, and every pose doubted: nobody known signed it

@@ -222,7 +222,8 @@ std::string fault_of(const CoreSettings& settings) {
   std::set<std::string> as_sent;
   for (const std::string& name : names) {
     if (!as_sent.insert(name.substr(0, wire::kMostBirdNameBytes)).second)
-      return "two birds of one name, by the first 20 letters, which are all that hosts are told";
+      return fmt::format("two birds of one name, by the first {} bytes, which are all that hosts are told",
+                         wire::kMostBirdNameBytes);
   }
   const PoseHistory::Settings& pose = settings.pose;
   if (pose.capacity == 0 || !is_limit(pose.acceleration_mm_s2)) return "limits of poses that are none";

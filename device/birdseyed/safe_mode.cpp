@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <sstream>
 #include <system_error>
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/crash_note.hpp"
+#include "drivers/system/part_file.hpp"
 #include "drivers/system/whole_file.hpp"
 
 namespace birdseye::device {
@@ -26,19 +26,6 @@ constexpr Duration kSoonOver = Duration::from_ms(120'000);
 
 bool is_part(const std::string& name) {
   return std::find(kParts.begin(), kParts.end(), name) != kParts.end();
-}
-
-bool write_whole(const fs::path& path, const std::string& text) {
-  fs::path written = path;
-  written += ".new";
-  std::error_code ignored;
-  fs::remove(written, ignored);  // a link that lies there leads to another file
-  std::ofstream out(written, std::ios::binary);
-  out << text;
-  out.close();
-  std::error_code error;
-  if (out) fs::rename(written, path, error);
-  return out && !error;
 }
 
 std::optional<RunMemory> read(const fs::path& path) {
@@ -93,8 +80,8 @@ SafeMode SafeMode::begin(const fs::path& folder) {
   safe.left_out_ = run.left_out;
   if (auto kept = CrashNote::keep_in(note); !kept) {
     spdlog::warn("crashes are not remembered: {}", kept.error().what);
-  } else if (!write_whole(memory, text_of(run))) {
-    spdlog::warn("crashes are not remembered: {}: cannot be written", memory.string());
+  } else if (auto written = write_durably(memory, text_of(run)); !written) {
+    spdlog::warn("crashes are not remembered: {}", written.error().what);
   } else {
     safe.memory_ = memory;
   }

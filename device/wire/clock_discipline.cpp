@@ -14,10 +14,12 @@ namespace birdseye::wire {
 ClockDiscipline decode_discipline(const timex& reading, int state) {
   ClockDiscipline discipline;
   const auto status = static_cast<unsigned>(reading.status);
+  // The kernel keeps the errors as a program told it: one below zero is none, and such a clock is as good as
+  // undisciplined.
+  const bool errors_known = reading.maxerror >= 0 && reading.esterror >= 0;
   // TIME_ERROR also comes for a lost pulse per second; STA_UNSYNC is what says that nobody disciplines the clock.
-  discipline.synchronised = state != TIME_ERROR && (status & STA_UNSYNC) == 0;
-  // The kernel keeps them as it was told: what is below zero is nobody's error, and hosts refuse it.
-  discipline.max_error = {std::max(reading.maxerror, 0L) * 1000};
+  discipline.synchronised = errors_known && state != TIME_ERROR && (status & STA_UNSYNC) == 0;
+  discipline.max_error = {std::max(reading.maxerror, 0L) * 1000};  // hosts refuse one below zero
   discipline.est_error = {std::max(reading.esterror, 0L) * 1000};
   discipline.tai_known = reading.tai != 0;
   discipline.source = fmt::format("adjtimex: {}{}", discipline.synchronised ? "synchronised" : "not synchronised",

@@ -5,6 +5,8 @@
 
 #include <utility>
 
+#include "device/wire/igtl_bytes.hpp"
+
 namespace birdseye::wire {
 
 namespace {
@@ -119,8 +121,8 @@ void ForeignFeed::take(const Header& header, const ForeignPoses& poses, HostTime
                 .first->second;
   };
   for (const std::string& name : poses.doubled)
-    pass_over(fmt::format("\"{}\", which stands twice in one list: give the tools names whose first 20 letters differ",
-                          name));
+    pass_over(fmt::format("\"{}\", which stands twice in one list: give the tools names whose first {} bytes differ",
+                          name, kMostBirdNameBytes));
   for (const std::string& name : poses.no_poses) (void)tool_of(name);
   Birds birds{time, {}};
   for (const Bird& bird : poses.birds) {

@@ -14,6 +14,8 @@ namespace birdseye::wire {
 
 /// Of a bird's name as much as TDATA has room for.
 inline constexpr std::size_t kMostBirdNameBytes = 20;
+/// And as much as a TRANSFORM's device name has room for, with "ToTracker" behind.
+inline constexpr std::size_t kMostTransformNameBytes = 11;
 inline constexpr std::size_t kHeaderBytes = 58;
 
 /// The protocol's checksum: CRC-64 of ECMA-182, by ISA-L, which is thirty times as fast as the protocol library's own.

@@ -38,16 +38,16 @@ void get_time(const json& in, std::int64_t& ns) {
 namespace {
 
 [[noreturn]] void refuse_negative(const json& in) {
-  throw json::out_of_range::create(406, "a value that is not below zero is wanted", &in);
+  throw json::out_of_range::create(406, "a finite value that is not below zero is wanted", &in);
 }
 
 /// Of what is never below zero. A sigma that is would switch off whatever asks whether it is too large.
-void get_size(const json& in, double& value) {
+void get_not_negative(const json& in, double& value) {
   in.get_to(value);
   if (!std::isfinite(value) || value < 0) refuse_negative(in);
 }
 
-void get_length(const json& in, std::int64_t& ns) {
+void get_not_negative(const json& in, std::int64_t& ns) {
   get_time(in, ns);
   if (ns < 0) refuse_negative(in);
 }
@@ -140,16 +140,16 @@ void to_json(json& out, const FrameInfo& info) {
 void from_json(const json& in, FrameInfo& info) {
   get_whole(in.at("sequence"), info.sequence);
   get_time(in.at("acquired_ns"), info.acquired.ns);
-  get_length(in.at("acquired_sigma_ns"), info.acquired_sigma.ns);
+  get_not_negative(in.at("acquired_sigma_ns"), info.acquired_sigma.ns);
   get_time(in.at("arrived_ns"), info.arrived.ns);
   get_whole(in.at("frames_dropped"), info.frames_dropped);
   if (in.contains("latency_ns")) get_time(in.at("latency_ns"), info.latency.emplace().ns);
   const json& pose = in.at("pose");
   const auto kind = pose.at("kind").get<std::string>();
   pose.at("reason").get_to(info.pose.reason);
-  get_size(pose.at("sigma_mm"), info.pose.position_sigma_mm);
-  get_length(pose.at("time_sigma_ns"), info.pose.time_sigma.ns);
-  get_size(pose.at("speed_mm_s"), info.pose.speed_mm_s);
+  get_not_negative(pose.at("sigma_mm"), info.pose.position_sigma_mm);
+  get_not_negative(pose.at("time_sigma_ns"), info.pose.time_sigma.ns);
+  get_not_negative(pose.at("speed_mm_s"), info.pose.speed_mm_s);
   get_time(pose.at("age_ns"), info.pose.age.ns);
   // The newest pose lies before what is predicted from it.
   if (kind == to_string(PoseKind::predicted) && info.pose.age.ns < 0) refuse_negative(pose.at("age_ns"));
@@ -260,8 +260,8 @@ void from_json(const json& in, WallClock& clock) {
   in.at("known").get_to(clock.known);
   in.at("synchronised").get_to(clock.synchronised);
   in.at("tai_known").get_to(clock.tai_known);
-  get_length(in.at("max_error_ns"), clock.max_error_ns);
-  get_length(in.at("est_error_ns"), clock.est_error_ns);
+  get_not_negative(in.at("max_error_ns"), clock.max_error_ns);
+  get_not_negative(in.at("est_error_ns"), clock.est_error_ns);
   get_whole(in.at("wall_minus_monotonic_ns"), clock.wall_minus_monotonic_ns);
   // A wall clock that was set to a year far away is not known; the rest of the message is sound.
   if (!is_near(clock.wall_minus_monotonic_ns)) {

@@ -140,7 +140,8 @@ Packet pack(const Birds& birds, DeviceTime arrived, bool transforms) {
 
 std::string transform_device(const std::string& bird) {
   constexpr std::string_view kTo = "ToTracker";
-  constexpr std::size_t kRoom = sizeof(igtl_header::device_name) - kTo.size();
+  constexpr std::size_t kRoom = kMostTransformNameBytes;
+  static_assert(kRoom == sizeof(igtl_header::device_name) - kTo.size());
   std::string name = bird;
   if (name.size() > kRoom) {
     std::size_t end = kRoom;

@@ -229,7 +229,7 @@ class Newcomers {
   void take(std::unique_ptr<Link> accepted);
   /// Whether all of its first message is there. An error: it has gone, or has been silent for too long.
   static Result<bool> read(Newcomer& newcomer, bool readable);
-  void send_away(const Newcomer& newcomer);
+  void note_silent(const Newcomer& newcomer);
 
   Listener& listener_;
   std::list<Newcomer> waiting_;
@@ -255,7 +255,7 @@ Result<bool> Newcomers::read(Newcomer& newcomer, bool readable) {
   return false;
 }
 
-void Newcomers::send_away(const Newcomer& newcomer) {
+void Newcomers::note_silent(const Newcomer& newcomer) {
   if (silent_.size() < kMostNamed) silent_.insert(newcomer.entry.address);
 }
 
@@ -276,12 +276,12 @@ std::optional<Newcomers::Committed> Newcomers::wait(Deadline deadline) {
         waiting_.clear();
         return found;
       }
-      if (!committed) send_away(*newcomer);
+      if (!committed) note_silent(*newcomer);
       newcomer = committed ? std::next(newcomer) : waiting_.erase(newcomer);
     }
     if (somebody) take(listener_.accept());
   } while (!deadline.passed());
-  for (const Newcomer& newcomer : waiting_) send_away(newcomer);
+  for (const Newcomer& newcomer : waiting_) note_silent(newcomer);
   return std::nullopt;
 }
 

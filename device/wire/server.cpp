@@ -1,7 +1,5 @@
 #include "device/wire/server.hpp"
 
-#include <arpa/inet.h>
-
 #include <algorithm>
 #include <iterator>
 #include <map>
@@ -18,11 +16,6 @@ constexpr Duration kLook = Duration::from_ms(200);  // for clients that are stuc
 constexpr Duration kLookAgain = Duration::from_ms(1), kAsksAgain = Duration::from_ms(10);
 
 }  // namespace
-
-bool is_address(const std::string& text) {
-  in_addr address{};
-  return ::inet_pton(AF_INET, text.c_str(), &address) == 1;
-}
 
 Result<std::unique_ptr<Server>> Server::listen(const std::string& bind_address, int port, Admission admission) {
   auto listener = listen_tcp(bind_address, port, std::move(admission));

@@ -19,9 +19,6 @@
 
 namespace birdseye::wire {
 
-/// Whether text is an IPv4 address in dots, as Server::listen() takes.
-bool is_address(const std::string& text);
-
 /// Sends packets to every client that is connected, and answers what they ask (docs/manual/wire.md). A client that does
 /// not keep up loses the oldest packets that wait for it (never parts of one), not the others; one that takes nothing
 /// for ten seconds, or does not speak the protocol, is disconnected; one that asks without end is answered at a bounded

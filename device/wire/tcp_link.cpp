@@ -92,6 +92,16 @@ bool is_loopback(const std::string& address) {
   return ::inet_pton(AF_INET, address.c_str(), &parsed) == 1 && ntohl(parsed.s_addr) >> 24U == 127;
 }
 
+std::string fault_of_bind(const std::string& address) {
+  constexpr unsigned kFirstOfGroups = 224;  // from here on multicast, reserved and broadcast
+  in_addr read{};
+  if (::inet_pton(AF_INET, address.c_str(), &read) != 1)
+    return fmt::format("\"{}\": give an IPv4 address of this machine, as 127.0.0.1", address);
+  if (ntohl(read.s_addr) >> 24U >= kFirstOfGroups)
+    return fmt::format("\"{}\" is no machine's but that of many; give an IPv4 address of this machine", address);
+  return {};
+}
+
 std::unique_ptr<Link> link_over(UniqueFd connected) {
   const std::string peer = peer_of(connected);
   return link_over(std::move(connected), peer.empty() || is_loopback(peer));

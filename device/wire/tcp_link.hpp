@@ -23,6 +23,9 @@ Result<std::unique_ptr<Link>> connect_tcp(const std::string& host, int port, Dea
 std::string peer_of(const UniqueFd& connected);
 /// Whether it is an address by which a machine speaks to itself and to no other (127.0.0.0/8).
 bool is_loopback(const std::string& address);
+/// Why no server can wait for others at an address, in words; empty where one can: an IPv4 address in dots of one
+/// machine.
+std::string fault_of_bind(const std::string& address);
 
 /// Who is let in, and how. Programs of this machine speak plain; others by TLS, and plain only where that is allowed.
 struct Admission {

@@ -207,12 +207,12 @@ class TcpListener final : public Listener {
 }  // namespace
 
 Result<std::unique_ptr<Listener>> listen_tcp(const std::string& bind_address, int port, Admission admission) {
+  if (const std::string fault = fault_of_bind(bind_address); !fault.empty())
+    return Error{Errc::bad_value, "[wire] bind " + fault};
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
-  if (::inet_pton(AF_INET, bind_address.c_str(), &address.sin_addr) != 1) {
-    return Error{Errc::bad_value, fmt::format("[wire] bind \"{}\": give an IPv4 address, as 127.0.0.1", bind_address)};
-  }
+  ::inet_pton(AF_INET, bind_address.c_str(), &address.sin_addr);
   UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int on = 1;
   if (fd) ::setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);

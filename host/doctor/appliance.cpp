@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "calibration/record/record_words.hpp"
 #include "host/link/appliance_link.hpp"
 
 namespace birdseye::host {
@@ -32,10 +33,10 @@ ApplianceTold listen_to(wire::Client& client) {
 
 /// The remedy that birdseyed names for a record that knows no instruments, for this appliance.
 std::string bind_command(const std::string& address) {
-  return fmt::format("birdseye calibrate record FILE --bind {}", address);
+  return fmt::format("{} {}", calibration::kBindCommand, address);
 }
 bool is_unbound(const std::string& why_not) {
-  return why_not.find("calibrate record FILE --bind") != std::string::npos;
+  return why_not.find(calibration::kBindCommand) != std::string::npos;
 }
 
 Check status_check(const wire::Status& status, const std::string& address) {
@@ -111,7 +112,7 @@ Check calibration_check(const wire::Calibration& calibration, const std::string&
     check.found = calibration.why_not.empty() ? "none is in force" : calibration.why_not;
     if (is_unbound(check.found)) {
       check.remedy = bind_command(address);
-    } else if (check.found.find("the record's latency was measured with") != std::string::npos) {
+    } else if (check.found.find(calibration::kOfAnotherDelay) != std::string::npos) {
       check.remedy = fmt::format(
           "set [camera] delay_ms back, or birdseye calibrate latency --server {} --record FILE: "
           "docs/manual/calibrate-latency.md",

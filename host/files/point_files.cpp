@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <sstream>
+
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye::host {
 
@@ -19,9 +20,12 @@ constexpr const char* kImagePoints = "image_points";
 
 /// Rows of so many numbers.
 Result<std::vector<std::vector<double>>> read_rows(const fs::path& path, std::size_t columns) {
-  std::ifstream file(path);
-  if (!file)
+  const auto text = read_whole_file(path, kMostTextBytes);
+  if (!text && text.error().code == Errc::unsupported)
+    return Error{Errc::bad_format, path.string() + ": is larger than any list of points"};
+  if (!text)
     return Error{Errc::unreadable, path.string() + ": cannot be read; a view needs ids, object and image points"};
+  std::istringstream file(*text);
   std::vector<std::vector<double>> rows;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {

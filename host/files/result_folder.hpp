@@ -15,8 +15,8 @@ struct ResultFolder {
   std::string command;  ///< as "register views", for messages
   std::string sheet;    ///< as "result.json"
   std::string names;    ///< a regular expression for those of the others
-  /// What every sheet of the command holds, where there are sheets of it that have no verdict, or list no files: where
-  /// one lists none, all in the folder that has one of the names is its own. Empty: there are no such sheets.
+  /// A key that every sheet of the command has. Needed where sheets may lack a verdict, or a list of files; a sheet
+  /// without a list owns all files whose names match. Empty: there are no such sheets.
   std::string key = {};
   const char* option = "--out";  ///< that names the folder, for messages
 };

@@ -17,14 +17,14 @@ constexpr std::size_t kFewestFiducials = 3;
 }  // namespace
 
 bool FiducialStep::add(const Touch& touch, std::size_t wanted, const Instruments& found_with) {
-  // What was suspected stays so: each thing more that speaks against them would drop them again, and nobody could
-  // register.
+  // They stay suspected: otherwise the next thing that speaks against the new touches would drop these too, and nobody
+  // could register.
   const bool only_suspected = confirmed_ && begins_anew();
   if (held_back_ || begins_anew()) {
     dropped_ = touches_.size();
     touches_.clear();
     registered_.reset();
-    fit_is_due_ = held_back_ = touched_before_ = false;
+    fit_is_due_ = held_back_ = touches_precede_suspicion_ = false;
     confirmed_ = true;
   } else if (touches_.empty()) {
     dropped_ = 0;

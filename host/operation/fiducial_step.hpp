@@ -41,13 +41,12 @@ class FiducialStep {
   }
   /// Something may have moved since the first touch, or since it was confirmed.
   void suspect() {
-    if (!suspected_) touched_before_ = suspected_ = registered_ || !touches_.empty();
+    if (!suspected_) touches_precede_suspicion_ = suspected_ = registered_ || !touches_.empty();
   }
   [[nodiscard]] bool suspected() const { return suspected_; }
-  /// A touch would drop those before it, also where nothing is held back. Of before something spoke against them, they
-  /// may be of another setup, and a fit is of one.
+  /// The next touch drops the earlier ones: something spoke against them since, and they may be of another setup.
   [[nodiscard]] bool begins_anew() const {
-    return !confirmed_ || (suspected_ && touched_before_ && !held_back_ && !touches_.empty());
+    return !confirmed_ || (suspected_ && touches_precede_suspicion_ && !held_back_ && !touches_.empty());
   }
   /// Whether the registration holds is to be looked at anew; touches that gave none yet are dropped.
   void doubt();
@@ -80,7 +79,7 @@ class FiducialStep {
   Instruments found_with_;  ///< all touches, or what was taken up
   bool confirmed_ = true, suspected_ = false, held_back_ = false, person_may_say_ = false;
   std::string fault_, line_;                    ///< line_: of what is held back, as it was found
-  bool touched_before_ = false;                 ///< touches_ are of before it was suspected
+  bool touches_precede_suspicion_ = false;      ///< touches_ are of before it was suspected
   std::size_t dropped_ = 0;                     ///< touches that the first of touches_ took the place of
   bool done_ = false;                           ///< and whether the step was done by it
   bool fit_is_due_ = false;                     ///< of touches that are held back

@@ -236,8 +236,12 @@ void LiveWorkflow::fit() {
   const bool same =
       before && registered && before->tracker_from_patient.matrix() == registered->tracker_from_patient.matrix();
   if (!same) {
-    // In doubt nothing was touched since: some of the same touches were fitted.
-    fiducials_.confirmed() ? off_.forget() : off_.forget_but_refusing();
+    // While the registration is in doubt a fit is of the same touches, less some: a landmark that was off still counts.
+    if (fiducials_.confirmed()) {
+      off_.forget();
+    } else {
+      off_.forget_but_refusing();
+    }
     fits_at_mm_.reset();
   }
   asked_to_take_back_.reset();

@@ -44,8 +44,8 @@ void LiveWorkflow::take(const wire::Calibration& calibration) {
   follow_held_back();
 }
 
-/// By another tip the fiducials would have been touched elsewhere: whether the registration holds a look tells. So
-/// would strokes, and what was matched with them.
+/// The fiducials were touched with another tip, so they may lie elsewhere: a person has to look whether the
+/// registration holds. Strokes, and what was matched with them, are dropped for the same reason.
 void LiveWorkflow::note_tip() {
   const auto& tip_mm = tip_in_pointer_mm();
   // What is held back may come back with the pointer that it was touched with.

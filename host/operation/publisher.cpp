@@ -51,7 +51,7 @@ Result<std::unique_ptr<Publisher>> Publisher::listen(const std::string& address)
   int port = -1;
   const char* const end = digits.data() + digits.size();
   const auto [rest, fault] = std::from_chars(digits.data(), end, port);
-  if (fault != std::errc() || rest != end || port < 0 || port > 65535 || !wire::is_address(bind)) {
+  if (fault != std::errc() || rest != end || port < 0 || port > 65535 || !wire::fault_of_bind(bind).empty()) {
     return Error{Errc::bad_value,
                  fmt::format("--publish: \"{}\" is no port of this machine: give PORT, or ADDRESS:PORT", address)};
   }

@@ -267,8 +267,10 @@ Result<void> RecordingWriter::end_film() {
 
 void RecordingWriter::keep_sums(SequenceWriter& sequence) {
   const auto sums = sequence.sums();
-  if (!sums) damage_.push_back(sums.error().what);
-  if (!sums) return;
+  if (!sums) {
+    damage_.push_back(sums.error().what);
+    return;
+  }
   for (const auto& [name, sum] : *sums) files_.wrote(name, sum);
 }
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kTakesUpWithin_s = 2;  // once the instruments are those that it was registered with
 constexpr double kSaidWithin_s = 2;     // that something could not be kept
-constexpr double kSame_mm = 1e-6;       // what was kept is text in between
+constexpr double kSame_mm = 1e-6;       // less than any change that matters
 
 /// kept, found: double or places, in mm.
 template <typename Values>

@@ -16,7 +16,7 @@ given = parser.parse_args()
 def poses(folder):
     """Each good measurement's 16 numbers, tracker_from_sensor row by row."""
     path = os.path.join(folder, "tracker.igs.mha")
-    field = re.compile(r"Seq_Frame(\d+)_%sToTrackerTransform(Status)? = (.*)" % given.bird, re.I)
+    field = re.compile(r"Seq_Frame(\d+)_%sToTrackerTransform(Status)? = (.*)" % re.escape(given.bird), re.I)
     found, good = {}, set()
     with open(path, encoding="latin-1") as file:
         for line in file:

@@ -116,7 +116,9 @@ TEST(Config, ARecordWhoseLatencyWasMeasuredWithAnotherDelayIsNotUsed) {
   EXPECT_NE(refusal(0, set, "accept_unsigned = true\n").find("delay_ms"), std::string::npos);
   EXPECT_NE(refusal(40, "").find("delay_ms = 40, which is not set now"), std::string::npos) << refusal(40, "");
   EXPECT_EQ(refusal(83.1, set), "");
-  EXPECT_EQ(refusal(0, ""), "");
+  EXPECT_EQ(refusal(0, "delay_ms = 0\n"), "");
+  EXPECT_NE(refusal(0, "").find("delay_ms = 0, which is not set now"), std::string::npos)
+      << "half a period is taken off";
   EXPECT_EQ(refusal(std::nullopt, set), "") << "a record of before";
 }
 

@@ -28,6 +28,7 @@ TEST(ClockDiscipline, IsDecodedFromTheKernelsWords) {
   EXPECT_FALSE(decode_discipline(reading, TIME_ERROR).synchronised);
   EXPECT_TRUE(decode_discipline(reading, TIME_INS).synchronised);
   reading.maxerror = reading.esterror = -5;  // as a daemon may have told the kernel
+  EXPECT_FALSE(decode_discipline(reading, TIME_OK).synchronised);
   EXPECT_EQ(decode_discipline(reading, TIME_OK).max_error.ns, 0);
   EXPECT_EQ(decode_discipline(reading, TIME_OK).est_error.ns, 0);
 }

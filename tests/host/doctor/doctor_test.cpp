@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "calibration/record/identity.hpp"
+#include "calibration/record/record_words.hpp"
 #include "drivers/system/wait.hpp"
 #include "host/doctor/appliance.hpp"
 #include "host/doctor/cameras.hpp"
@@ -355,7 +356,8 @@ TEST(DoctorAppliance, ARecordBoundToNothingNamesTheCommandThatBindsIt) {
   checks = appliance_checks("cart:18944", told);
   EXPECT_EQ(named(checks, "status").remedy, "see the calibration record below");
   EXPECT_THAT(named(checks, "calibration record").remedy, HasSubstr("[calibration] record"));
-  told.calibration->why_not = "calibration: r.json: the record's latency was measured with [camera] delay_ms = 0";
+  told.calibration->why_not =
+      fmt::format("calibration: r.json: {} [camera] delay_ms = 0", calibration::kOfAnotherDelay);
   checks = appliance_checks("cart:18944", told);
   EXPECT_THAT(named(checks, "calibration record").remedy, HasSubstr("--server cart:18944 --record FILE"));
 }

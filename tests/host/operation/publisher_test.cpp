@@ -185,7 +185,7 @@ TEST(Publisher, SaysWhyItCannotListen) {
   EXPECT_EQ(second.error().code, Errc::in_use);
   EXPECT_THAT(second.error().what,
               AllOf(HasSubstr("--publish"), HasSubstr(std::to_string(first->port())), HasSubstr("choose another")));
-  for (const char* wrong : {"", "x", "70000", "12:", "nowhere:18944", "-1"}) {
+  for (const char* wrong : {"", "x", "70000", "12:", "nowhere:18944", "224.0.0.1:18944", "-1"}) {
     const auto refused = Publisher::listen(wrong);
     ASSERT_FALSE(refused) << wrong;
     EXPECT_THAT(refused.error().what, HasSubstr("--publish"));

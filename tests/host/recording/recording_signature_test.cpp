@@ -312,7 +312,8 @@ TEST(RecordingSignature, OneWhoseFilmWasNotFinishedIsSignedByNobody) {
   EXPECT_NE(finished.error().what.find("no room left"), std::string::npos) << finished.error().what;
   EXPECT_NE(refusal(scratch / "r", own), "");
   const auto sheet = nlohmann::json::parse(contents_of(scratch / "r" / kRecordingSheet));
-  EXPECT_FALSE(sheet.contains("signature")) << sheet;
+  EXPECT_FALSE(sheet.contains("signed")) << sheet;
+  EXPECT_FALSE(sheet.contains("sha256")) << sheet;
 }
 
 /// What lies there is another's, and a link leads to one.

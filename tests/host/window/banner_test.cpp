@@ -35,7 +35,7 @@ TEST(Banner, IsGreenWhereACheckOfTheSurfaceCouldTellLatelyAndNotElse) {
   operation.surface_unchecked = true;
   banner = over_a_whole_overlay(operation);
   EXPECT_EQ(banner.grade, Grade::marginal);
-  EXPECT_NE(banner.text.find("no check since it was matched could tell yet"), std::string::npos) << banner.text;
+  EXPECT_NE(banner.text.find("no check since the CT was matched could tell yet"), std::string::npos) << banner.text;
   operation.watched = operation.surface_unchecked = false;
   banner = over_a_whole_overlay(operation);
   EXPECT_EQ(banner.grade, Grade::marginal);
