@@ -157,8 +157,8 @@ const ModelFit& best_of(const std::vector<ModelFit>& fits) {
     if (std::isfinite(fit.held_out_px) && (rival == nullptr || fit.held_out_px < rival->held_out_px)) rival = &fit;
   }
   // A lens that fits far better and folds is what the views say; one that does not fold and does not fit helps nobody.
-  constexpr double kAlikeCorrelation = 0.5;
-  if (best == nullptr || (best_folding != nullptr && best_folding->held_out_px < kAlikeCorrelation * best->held_out_px))
+  constexpr double kFarBetter = 0.5;
+  if (best == nullptr || (best_folding != nullptr && best_folding->held_out_px < kFarBetter * best->held_out_px))
     return best_folding != nullptr ? *best_folding : fits.front();
   return *best;
 }

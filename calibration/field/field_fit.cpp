@@ -282,12 +282,12 @@ Error other_lengths(double scale) {
 }
 
 bool is_mirrored(std::span<const FieldSample> samples, const Vectors& measured_mm) {
-  constexpr double kAlikeCorrelation = 3;
+  constexpr double kFarBetter = 3;
   Vectors true_mm;
   true_mm.reserve(samples.size());
   for (const FieldSample& s : samples) true_mm.push_back(s.true_mm);
   const PointShape shape = compare_shapes(measured_mm, true_mm);
-  return shape.mirrored_fre_rms_mm < shape.fre_rms_mm / kAlikeCorrelation;
+  return shape.mirrored_fre_rms_mm < shape.fre_rms_mm / kFarBetter;
 }
 
 /// How far the measured places lie from their middle, as a multiple of how far the true ones do; root mean square.

@@ -21,7 +21,7 @@ namespace {
 
 // A fit so bad that another reading of the poses may be the right one, and how many times better that has to fit.
 constexpr double kBadFit_deg = 3, kBadFit_mm = 5;
-constexpr double kAlikeCorrelation = 3;
+constexpr double kFarBetter = 3;
 
 using Stations = std::vector<SummedStation>;
 
@@ -112,7 +112,7 @@ Finding seem_disordered(QuaternionOrder tracked, QuaternionOrder eye, double fit
 /// A quaternion with w in the wrong place turns as the inverse does, in frames of its own, and two such files as right
 /// ones: only the positions, which stay where they are, tell. least_mm: to which other readings fit them.
 std::optional<Finding> find_disorder(const StationsInOrder& in, double least_mm) {
-  double best_mm = least_mm / kAlikeCorrelation, best_deg = 0;
+  double best_mm = least_mm / kFarBetter, best_deg = 0;
   QuaternionOrder tracked = QuaternionOrder::as_read, eye = QuaternionOrder::as_read;
   for (const QuaternionReading& of_tracker : kQuaternionReadings) {
     for (const QuaternionReading& of_eye : kQuaternionReadings) {
@@ -185,7 +185,7 @@ struct AxesReading {
 std::optional<Finding> find_wrong_axes(const StationsInOrder& in) {
   const double as_given_mm = position_misfit_mm(in.stations);
   if (as_given_mm < kBadFit_mm) return std::nullopt;
-  double best_mm = as_given_mm / kAlikeCorrelation;
+  double best_mm = as_given_mm / kFarBetter;
   std::optional<AxesReading> best;
   AxesReading reading;
   do {
@@ -232,7 +232,7 @@ std::optional<Finding> find_wrong_frames(const StationsInOrder& in) {
   const double as_given_deg = rotation_misfit_deg(in.stations);
   if (as_given_deg < kBadFit_deg) return find_wrong_axes(in);
   const double inverted_deg = rotation_misfit_deg(with_poses(in, [](const auto& pose) { return inverted(pose); }));
-  if (inverted_deg > as_given_deg / kAlikeCorrelation) return std::nullopt;
+  if (inverted_deg > as_given_deg / kFarBetter) return std::nullopt;
   double inverted_mm = position_misfit_mm(with_poses(in, [](const auto& pose) { return turned_round(pose); }));
   if (in.given_poses) inverted_mm = std::min(inverted_mm, position_misfit_mm(with_eyes_turned_round(in)));
   if (auto found = find_disorder(in, inverted_mm)) return found;

@@ -16,7 +16,7 @@ namespace {
 using Pose = Transform<Tracker, Sensor>;
 
 /// A fit so bad that another reading of the file may be the right one, and how much better that must fit.
-constexpr double kBadFit_mm = 2.5, kAlikeCorrelation = 3;
+constexpr double kBadFit_mm = 2.5, kFarBetter = 3;
 
 template <QuaternionOrder order>
 Pose with_quaternion(const Pose& pose) {
@@ -73,7 +73,7 @@ double residual_mm(const TipInput& input, const OtherReading& other) {
 
 void judge_other_readings(const TipInput& input, double as_read_mm, Verdict& verdict) {
   const OtherReading* best = nullptr;
-  double best_mm = as_read_mm / kAlikeCorrelation;
+  double best_mm = as_read_mm / kFarBetter;
   for (const OtherReading& other : kOtherReadings) {
     const double off_mm = residual_mm(input, other);
     if (off_mm > best_mm) continue;
