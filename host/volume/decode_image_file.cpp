@@ -153,6 +153,8 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
     }
     if (nifti) {
       if (const std::string fault = nifti->type_fault(); !fault.empty()) return refused(Errc::unsupported, path, fault);
+      if (const std::string fault = nifti->reading_fault(); !fault.empty())
+        return refused(Errc::unsupported, path, fault);
       if (!nifti->holds_voxels() && !names_other_files(path)) {
         return refused(Errc::unsupported, path,
                        "keeps its voxels in another file, as only a header does: name it .hdr, beside its .img");
@@ -193,6 +195,10 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
       image.origin_mm[axis] = io->GetOrigin(axis);
       for (unsigned row = 0; row < 3; ++row) image.axes(row, axis) = io->GetDirection(axis)[row];
     }
+    if (const std::string misread = misread_geometry(path, image); !misread.empty())
+      return refused(Errc::unsupported, path, misread);
+    if (const std::string turned = components == 3 ? turned_vectors(path) : std::string(); !turned.empty())
+      return refused(Errc::unsupported, path, turned);
     const std::size_t row = static_cast<std::size_t>(components) * io->GetDimensions(0);
     if (nifti) {
       // By the file's own type: a slope makes the reader give floats where the file holds integers.

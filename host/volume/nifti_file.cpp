@@ -38,6 +38,8 @@ fs::path image_of(fs::path header) {
 
 constexpr std::int16_t kLastCode = 5;
 
+constexpr int kLastUnit = 3;
+
 /// Talairach's, the MNI152's, or another template's.
 bool is_atlas(std::int16_t code) {
   return code >= 3 && code <= kLastCode;
@@ -57,10 +59,10 @@ std::optional<NiftiFile> NiftiFile::open(const fs::path& path) {
   const auto size = file.number<std::int32_t>(0);
   file.swapped_ = size != kHeaderBytes;
   if (file.number<std::int32_t>(0) != kHeaderBytes) return std::nullopt;
-  const bool single = std::memcmp(file.header_.data() + 344, "n+1", 3) == 0;
+  const bool single = file.holds_voxels();
   file.voxels_ = single ? path : image_of(path);
   const float offset = file.number<float>(108);
-  file.offset_ = single ? 352 : 0;
+  file.offset_ = single ? kLeastOffset : 0;
   if (offset > static_cast<float>(file.offset_) && offset < 1e9F) file.offset_ = static_cast<std::size_t>(offset);
   file.offset_is_sound_ = offset >= 0 && offset < 1e9F;
   return file;
@@ -114,8 +116,37 @@ std::string NiftiFile::type_fault() const {
   return {};
 }
 
+std::string NiftiFile::reading_fault() const {
+  if (!is_nifti()) return {};
+  const float offset = number<float>(108), slope = number<float>(112), intercept = number<float>(116);
+  if (holds_voxels() && offset < static_cast<float>(kLeastOffset)) {
+    return fmt::format(
+        "says that its voxels begin at byte {:g} (vox_offset), within its header, which takes {}; export it again by a "
+        "program that writes where they begin",
+        offset, kLeastOffset);
+  }
+  if (slope < 0) {
+    return fmt::format(
+        "has a scl_slope of {:g}, below 0, which turns bright to dark; export it again, with its values in Hounsfield "
+        "units",
+        slope);
+  }
+  if (slope == 0 && intercept != 0) {
+    return fmt::format(
+        "has a scl_slope of 0, by which NIfTI takes the values as they are stored, and a scl_inter of {:g}, by which "
+        "some programs shift them; set scl_slope to 1 where they are to be shifted, or scl_inter to 0",
+        intercept);
+  }
+  if (unit_code() > kLastUnit) {
+    return fmt::format(
+        "has its lengths in the unit {} (xyzt_units), which NIfTI does not know (1: m, 2: mm, 3: um); export it in mm",
+        unit_code());
+  }
+  return {};
+}
+
 bool NiftiFile::is_nifti() const {
-  return std::memcmp(header_.data() + 344, "n+1", 3) == 0 || std::memcmp(header_.data() + 344, "ni1", 3) == 0;
+  return holds_voxels() || std::memcmp(header_.data() + 344, "ni1", 3) == 0;
 }
 
 bool NiftiFile::says_a_place() const {
@@ -270,7 +301,7 @@ VoxelPlace NiftiFile::in_patient(const Map& map) const {
 }
 
 double NiftiFile::unit_mm() const {
-  const int unit = header_[123] & 7;
+  const int unit = unit_code();
   return unit == 1 ? 1000 : unit == 3 ? 0.001 : 1;
 }
 

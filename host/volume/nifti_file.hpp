@@ -28,6 +28,10 @@ class NiftiFile {
   /// Why its numbers are none that a CT or a field has, with the remedy; empty where they may be.
   [[nodiscard]] std::string type_fault() const;
 
+  /// Why the reader would take other bytes for the voxels, or give them other values or lengths, than NIfTI says, with
+  /// the remedy; empty where it would not.
+  [[nodiscard]] std::string reading_fault() const;
+
   /// What the header lacks, or says twice differently, of where the voxels lie.
   [[nodiscard]] GeometryGaps gaps() const;
 
@@ -52,6 +56,7 @@ class NiftiFile {
 
  private:
   static constexpr std::int32_t kHeaderBytes = 348;
+  static constexpr std::size_t kLeastOffset = 352;  ///< of the voxels in a file that holds its header too
 
   /// Not Analyze, which has texts where NIfTI says a place.
   [[nodiscard]] bool is_nifti() const;
@@ -63,6 +68,7 @@ class NiftiFile {
   /// Why the qform's quaternion is no rotation, with the remedy; empty where it is one, or does not count.
   [[nodiscard]] std::string quaternion_fault() const;
   [[nodiscard]] std::string two_spacings() const;
+  [[nodiscard]] int unit_code() const { return header_[123] & 7; }
   [[nodiscard]] double unit_mm() const;
   /// Of a place in the header's own frame and unit.
   [[nodiscard]] VoxelPlace in_patient(const Eigen::Matrix<double, 3, 4>& map) const;

@@ -46,7 +46,7 @@ Result<std::vector<NamedLabel>> slicer_label_names(const std::filesystem::path& 
   file.read(first.data(), static_cast<std::streamsize>(first.size()));
   std::vector<NamedLabel> names;
   if (first != "NRRD") return names;
-  const auto segments = segments_in(header_fields(file, ':', ""));
+  const auto segments = segments_in(nrrd_fields(file));
   names.reserve(segments.size());
   for (const auto& [which, segment] : segments) {
     const auto said = [&segment = segment](const char* what) {

@@ -55,11 +55,10 @@ int directions_in(const std::string& text) {
 /// The first of these fields that is said a second time with another value; empty where none is.
 std::string said_again(const HeaderFields& fields, std::initializer_list<const char*> names) {
   for (const char* name : names) {
-    const std::string key = lower_case(name);
-    const auto again = fields.find(key + std::string(kAgain));
+    const auto again = fields.find(name + std::string(kAgain));
     if (again == fields.end()) continue;
     return fmt::format("says \"{}\" twice: {} and {}; keep the line that is right, or export it again", name,
-                       fields.at(key).substr(0, 80), again->second.substr(0, 80));
+                       fields.at(name).substr(0, 80), again->second.substr(0, 80));
   }
   return {};
 }
@@ -68,13 +67,13 @@ std::string said_again(const HeaderFields& fields, std::initializer_list<const c
 std::string two_differ(const HeaderFields& fields, std::initializer_list<const char*> names, double most) {
   const char* first = nullptr;
   for (const char* name : names) {
-    const auto found = fields.find(lower_case(name));
+    const auto found = fields.find(name);
     if (found == fields.end()) continue;
     if (first == nullptr) {
       first = name;
       continue;
     }
-    const std::string& text = fields.at(lower_case(first));
+    const std::string& text = fields.at(first);
     const auto a = numbers_in(text), b = numbers_in(found->second);
     const bool alike = std::equal(a.begin(), a.end(), b.begin(), b.end(),
                                   [most](double p, double q) { return std::abs(p - q) <= most; });
@@ -95,7 +94,7 @@ GeometryGaps gaps_of_nrrd(const HeaderFields& fields) {
   };
   GeometryGaps gaps;
   gaps.beyond = said_again(fields, {"dimension", "sizes", "space", "space dimension", "space directions",
-                                    "space origin", "space units", "spacings", "units"});
+                                    "space origin", "space units", "spacings", "units", "measurement frame"});
   if (!gaps.beyond.empty()) return gaps;
   const std::string space = value("space"), directions = value("space directions");
   if (directions.empty()) {
@@ -152,44 +151,63 @@ GeometryGaps gaps_of_meta_image(const HeaderFields& fields) {
     return std::string();
   };
   GeometryGaps gaps;
-  gaps.beyond =
-      said_again(fields, {"NDims", "DimSize", "ElementSpacing", "ElementSize", "Offset", "Position", "Origin",
-                          "TransformMatrix", "Rotation", "Orientation", "AnatomicalOrientation", "DistanceUnits",
-                          "ElementToIntensityFunctionSlope", "ElementToIntensityFunctionOffset", "HeaderSize"});
+  gaps.beyond = said_again(fields, {"NDims",
+                                    "DimSize",
+                                    "ElementSpacing",
+                                    "ElementSize",
+                                    "Offset",
+                                    "Position",
+                                    "Origin",
+                                    "TransformMatrix",
+                                    "Rotation",
+                                    "Orientation",
+                                    "AnatomicalOrientation",
+                                    "DistanceUnits",
+                                    "ElementToIntensityFunctionSlope",
+                                    "ElementToIntensityFunctionOffset",
+                                    "HeaderSize",
+                                    "ImagePosition",
+                                    "ElementType",
+                                    "ElementNumberOfChannels",
+                                    "BinaryData",
+                                    "BinaryDataByteOrderMSB",
+                                    "ElementByteOrderMSB",
+                                    "CompressedData",
+                                    "CompressedDataSize"});
   if (!gaps.beyond.empty()) return gaps;
   // The reader passes units over.
-  if (const std::string unit = value({"distanceunits"}); !unit.empty() && unit != "?" && lower_case(unit) != "mm") {
+  if (const std::string unit = value({"DistanceUnits"}); !unit.empty() && unit != "?" && lower_case(unit) != "mm") {
     gaps.beyond = fmt::format("has lengths in {} (DistanceUnits); export it in mm", unit.substr(0, 80));
     return gaps;
   }
-  const std::string dimensions = value({"ndims"});
+  const std::string dimensions = value({"NDims"});
   if (dimensions.size() != 1 || dimensions < "1" || dimensions > "9") {
     gaps.beyond = "does not say how many dimensions it has (NDims); export it again";
     return gaps;
   }
   if (dimensions < "3") return gaps;  // a picture, which is refused as such
-  const auto apart = numbers_in(value({"elementspacing"})), wide = numbers_in(value({"elementsize"}));
+  const auto apart = numbers_in(value({"ElementSpacing"})), wide = numbers_in(value({"ElementSize"}));
   if (!are_spacings(apart) && !are_spacings(wide)) {
     gaps.spacing = "does not say how far apart its voxels are (it has no ElementSpacing of its axes)";
   } else if (are_spacings(apart) && are_spacings(wide) &&
              !std::equal(apart.begin(), apart.begin() + 3, wide.begin(),
                          [](double a, double b) { return std::abs(a - b) < 1e-3 * a; })) {
     gaps.spacing = fmt::format("says two spacings of its voxels: ElementSpacing {}, ElementSize {}",
-                               value({"elementspacing"}), value({"elementsize"}));
+                               value({"ElementSpacing"}), value({"ElementSize"}));
   }
   if (const std::string two = two_differ(fields, {"Offset", "Position", "Origin"}, 1e-3); !two.empty()) {
     gaps.beyond = fmt::format("says where its first voxel lies {}", two);
-  } else if (!are_place(numbers_in(value({"offset", "position", "origin"})))) {
+  } else if (!are_place(numbers_in(value({"Offset", "Position", "Origin"})))) {
     gaps.place = "does not say where its first voxel lies (it has no Offset)";
   }
   if (const std::string two = two_differ(fields, {"TransformMatrix", "Rotation", "Orientation"}, 1e-4); !two.empty())
     gaps.beyond = fmt::format("says which way its axes point {}", two);
-  const auto turn = numbers_in(value({"transformmatrix", "rotation", "orientation"}));
+  const auto turn = numbers_in(value({"TransformMatrix", "Rotation", "Orientation"}));
   if (turn.empty()) {
     gaps.orientation = "does not say which way its axes point (it has no TransformMatrix)";
     return gaps;
   }
-  const std::string letters = turned_letters(value({"anatomicalorientation"}));
+  const std::string letters = turned_letters(value({"AnatomicalOrientation"}));
   if (turn.size() != 9 || !axes_of_letters(letters)) return gaps;
   Eigen::Affine3d axes = Eigen::Affine3d::Identity();
   axes.linear() = Eigen::Matrix3d::Map(turn.data());
@@ -204,18 +222,83 @@ std::string mm_of(const Eigen::Vector3d& mm) {
   return fmt::format("{:.4g} x {:.4g} x {:.4g} mm", mm.x(), mm.y(), mm.z());
 }
 
-}  // namespace
+enum class TextForm { none, nrrd, meta_image };
 
-GeometryGaps text_header_gaps(const std::filesystem::path& path) {
+struct TextHeader {
+  TextForm form = TextForm::none;
+  HeaderFields fields;
+};
+
+TextHeader text_header(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::string first(4, '\0');
   file.read(first.data(), static_cast<std::streamsize>(first.size()));
-  if (first == "NRRD") return gaps_of_nrrd(header_fields(file, ':', ""));
+  if (first == "NRRD") return {TextForm::nrrd, nrrd_fields(file)};
   const std::string ending = lower_case(path.extension().string());
   if (ending != ".mha" && ending != ".mhd") return {};
   file.clear();
   file.seekg(0);
-  return gaps_of_meta_image(header_fields(file, '=', "elementdatafile"));
+  return {TextForm::meta_image, meta_image_header(file).fields};
+}
+
+/// Of the first of these fields that the header has: what it says of three numbers, the first of them at `from`, that
+/// were read as others, further off than `most`; empty where they were read so.
+std::string misread_field(const HeaderFields& fields, std::initializer_list<const char*> names, std::size_t from,
+                          const Eigen::Vector3d& read, double most) {
+  const auto* const name = std::find_if(names.begin(), names.end(), [&](auto key) { return fields.contains(key); });
+  if (name == names.end()) return {};
+  const std::string& text = fields.at(*name);
+  const auto numbers = numbers_in(text);
+  if (numbers.size() < from + 3) return {};
+  if ((Eigen::Vector3d::Map(numbers.data() + from) - read).cwiseAbs().maxCoeff() <= most) return {};
+  return fmt::format(
+      "says {} {} in its header, of which {:.6g} {:.6g} {:.6g} is read: the header is not written as "
+      "MetaImage wants it; export it again by a program that writes it, as 3D Slicer",
+      *name, text.substr(0, 80), read.x(), read.y(), read.z());
+}
+
+}  // namespace
+
+GeometryGaps text_header_gaps(const std::filesystem::path& path) {
+  const TextHeader header = text_header(path);
+  if (header.form == TextForm::nrrd) return gaps_of_nrrd(header.fields);
+  return header.form == TextForm::meta_image ? gaps_of_meta_image(header.fields) : GeometryGaps();
+}
+
+std::string misread_geometry(const std::filesystem::path& path, const ImageFile& image) {
+  const auto [form, fields] = text_header(path);
+  const std::string dimensions = field_of(fields, "NDims");
+  if (form != TextForm::meta_image || dimensions.empty()) return {};
+  // A spacing or a direction is read as it is written; of names of one place that differ by a rounding one is read.
+  constexpr double kSpacing_mm = 1e-5, kPlace_mm = 1e-3, kDirection = 1e-4;
+  std::string told = misread_field(fields, {"ElementSpacing", "ElementSize"}, 0, image.spacing_mm, kSpacing_mm);
+  if (told.empty()) told = misread_field(fields, {"Offset", "Position", "Origin"}, 0, image.origin_mm, kPlace_mm);
+  const auto row = static_cast<std::size_t>(dimensions[0] - '0');
+  for (int axis = 0; axis < 3 && told.empty(); ++axis) {
+    told = misread_field(fields, {"TransformMatrix", "Rotation", "Orientation"}, row * static_cast<std::size_t>(axis),
+                         image.axes.col(axis), kDirection);
+  }
+  return told;
+}
+
+std::string turned_vectors(const std::filesystem::path& path) {
+  const auto [form, fields] = text_header(path);
+  if (form != TextForm::nrrd) return {};
+  const std::string space = field_of(fields, "space"), frame = field_of(fields, "measurement frame");
+  if (lower_case(space) != "left-posterior-superior" && lower_case(space) != "lps") {
+    return fmt::format(
+        "is a displacement field in the space \"{}\", whose vectors would be taken for left-posterior-superior ones; "
+        "write it in the space left-posterior-superior, the vectors too, as ITK and 3D Slicer do",
+        space.substr(0, 80));
+  }
+  if (frame.empty()) return {};
+  const auto numbers = numbers_in(frame);
+  constexpr double kRounding = 1e-6;
+  if (numbers.size() == 9 && Eigen::Matrix3d::Map(numbers.data()).isIdentity(kRounding)) return {};
+  return fmt::format(
+      "is a displacement field with the \"measurement frame\" {}, by which its vectors are not turned; write the "
+      "vectors in left-posterior-superior, without that line",
+      frame.substr(0, 80));
 }
 
 Result<void> check_stated(const VolumeSource& source, GeometryFrom from, const GeometryGaps& gaps) {

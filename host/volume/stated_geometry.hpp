@@ -31,6 +31,14 @@ struct GeometryGaps {
 /// 1 mm, axes as the patient's.
 GeometryGaps text_header_gaps(const std::filesystem::path& path);
 
+/// What a MetaImage's header says of where its voxels lie and its reader took otherwise, with the remedy; empty where
+/// the reader took all as it is said, and of any other file. image: by the reader alone, before put_stated.
+std::string misread_geometry(const std::filesystem::path& path, const ImageFile& image);
+
+/// Why the vectors of a NRRD's displacement field are not the patient's LPS, for which they would be taken (the reader
+/// turns the place of a field to LPS, and no vectors), with the remedy; empty where they are, and of any other file.
+std::string turned_vectors(const std::filesystem::path& path);
+
 /// Whose word counts where a file does not say where its voxels lie.
 enum class GeometryFrom { file, file_or_person };
 

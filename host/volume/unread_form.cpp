@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <initializer_list>
 #include <sstream>
 #include <string_view>
 #include <system_error>
@@ -33,8 +34,9 @@ bool is_one_of(const std::string& text, const std::array<std::string_view, N>& k
   return std::find(known.begin(), known.end(), text) != known.end();
 }
 
-/// The lines of a file from the one behind `last` on, up to a blank one: names of files of voxels.
-std::vector<std::string> listed_files(const fs::path& path, const std::string& last) {
+/// The lines of a file from behind the one that begins with one of these names on, up to a blank one: names of files of
+/// voxels.
+std::vector<std::string> listed_files(const fs::path& path, std::initializer_list<std::string_view> last) {
   constexpr std::size_t kMostLines = 100'000;
   std::ifstream file(path, std::ios::binary);
   std::vector<std::string> names;
@@ -44,7 +46,8 @@ std::vector<std::string> listed_files(const fs::path& path, const std::string& l
     const std::string_view text = without_blanks(line);
     if (behind && text.empty()) break;
     if (behind) names.emplace_back(text);
-    behind = behind || lower_case(text.substr(0, last.size())) == last;
+    behind =
+        behind || std::ranges::any_of(last, [small = lower_case(text)](auto name) { return small.starts_with(name); });
   }
   return names;
 }
@@ -139,7 +142,7 @@ std::string unread_nrrd(const fs::path& path, const HeaderFields& fields) {
   }
   if (type == "block" || type.find("long double") != std::string::npos)
     return fmt::format("has voxels of the type \"{}\", which is not read; save it as 16-bit integers", shown(type));
-  for (const char* name : {"old min", "oldmin", "old max", "oldmax"}) {
+  for (const char* name : {"old min", "old max"}) {
     const std::string value = field_of(fields, name);
     if (type == "float" || type == "double" || value.empty() || lower_case(value) == "nan") continue;
     return fmt::format("has voxels that stand for other values (\"{}\" {}), which are not read; save it with these",
@@ -154,49 +157,45 @@ std::string unread_nrrd(const fs::path& path, const HeaderFields& fields) {
   }
   if (encoding == "raw" && field_of(fields, "endian").empty() && !is_one_of(type, kOneByte))
     return "does not say in which order the bytes of its voxels come (it has no \"endian\"); export it again";
-  std::string data = field_of(fields, "data file");
-  const char* last = "data file:";
-  if (data.empty()) {
-    data = field_of(fields, "datafile");
-    last = "datafile:";
-  }
+  const std::string data = field_of(fields, "data file");
   if (data.empty()) return {};
   if (std::string unnamed = not_named_header(path, ".nhdr"); !unnamed.empty()) return unnamed;
-  if (lower_case(data.substr(0, 4)) == "list") return missing_file(path, listed_files(path, last), false);
+  if (lower_case(data.substr(0, 4)) == "list")
+    return missing_file(path, listed_files(path, {"data file:", "datafile:"}), false);
   return missing_file(path, {data}, data.find('%') != std::string::npos);
 }
 
 /// data_bytes: of what follows the header.
-std::string unread_meta_image(const fs::path& path, const HeaderFields& fields, std::uintmax_t data_bytes) {
-  if (field_of(fields, "ndims").empty()) return {};  // no MetaImage
+std::string unread_meta_image(const fs::path& path, const MetaImageHeader& header, std::uintmax_t data_bytes) {
+  if (!header.fault.empty()) return header.fault;
+  const HeaderFields& fields = header.fields;
+  if (field_of(fields, "NDims").empty()) return {};  // no MetaImage
   for (const char* name : {"DimSize", "ElementType", "ElementDataFile"}) {
-    if (field_of(fields, lower_case(name).c_str()).empty())
-      return fmt::format("lacks the field {} in its header; export it again", name);
+    if (field_of(fields, name).empty()) return fmt::format("lacks the field {} in its header; export it again", name);
   }
   static constexpr std::array<std::string_view, 12> kTypes = {
       "MET_CHAR", "MET_UCHAR", "MET_SHORT",     "MET_USHORT",     "MET_INT",   "MET_UINT",
       "MET_LONG", "MET_ULONG", "MET_LONG_LONG", "MET_ULONG_LONG", "MET_FLOAT", "MET_DOUBLE"};
-  const std::string type = field_of(fields, "elementtype");
+  const std::string type = field_of(fields, "ElementType");
   if (!is_one_of(type.substr(0, type.find("_ARRAY")), kTypes))
     return fmt::format("has voxels of the type {}, which is not read; save it as MET_SHORT", shown(type));
   for (const auto& [name, plain] :
        {std::pair{"ElementToIntensityFunctionSlope", 1.0}, {"ElementToIntensityFunctionOffset", 0.0}}) {
-    const std::string key = lower_case(name);
-    if (!is_other_than(fields, key.c_str(), plain)) continue;
+    if (!is_other_than(fields, name, plain)) continue;
     return fmt::format("has voxels that stand for other values ({} {}), which are not read; save it with these", name,
-                       shown(field_of(fields, key.c_str())));
+                       shown(field_of(fields, name)));
   }
-  const std::string data = field_of(fields, "elementdatafile");
+  const std::string data = field_of(fields, "ElementDataFile");
   if (lower_case(data) == "local") {
     // With -1 the voxels are the end of the file.
-    if (is_other_than(fields, "headersize", 0) && is_other_than(fields, "headersize", -1)) {
+    if (is_other_than(fields, "HeaderSize", 0) && is_other_than(fields, "HeaderSize", -1)) {
       return fmt::format(
           "says that its voxels begin at byte {} (HeaderSize), where its header is; take that line away, or export it "
           "again",
-          shown(field_of(fields, "headersize")));
+          shown(field_of(fields, "HeaderSize")));
     }
-    if (!says_true(fields, "compresseddata")) return {};
-    const std::string said = field_of(fields, "compresseddatasize");
+    if (!says_true(fields, "CompressedData")) return {};
+    const std::string said = field_of(fields, "CompressedDataSize");
     if (said.empty() || said == "0")
       return "does not say how long its compressed voxels are (CompressedDataSize); save it again, uncompressed";
     if (said == std::to_string(data_bytes)) return {};
@@ -207,7 +206,8 @@ std::string unread_meta_image(const fs::path& path, const HeaderFields& fields, 
         shown(said), data_bytes);
   }
   if (std::string unnamed = not_named_header(path, ".mhd"); !unnamed.empty()) return unnamed;
-  if (lower_case(data.substr(0, 4)) == "list") return missing_file(path, listed_files(path, "elementdatafile"), false);
+  if (lower_case(data.substr(0, 4)) == "list")
+    return missing_file(path, listed_files(path, {"elementdatafile"}), false);
   return missing_file(path, {data}, data.find('%') != std::string::npos);
 }
 
@@ -220,7 +220,7 @@ std::string unread_form(const fs::path& path) {
   // NIfTI-2 begins with the size of its header, in either order of bytes.
   if (first == std::string("\x1c\x02\0\0", 4) || first == std::string("\0\0\x02\x1c", 4))
     return "is NIfTI of another version than 1; save it as NIfTI-1";
-  if (first == "NRRD") return unread_nrrd(path, header_fields(file, ':', ""));
+  if (first == "NRRD") return unread_nrrd(path, nrrd_fields(file));
   const std::string name = lower_case(path.filename().string()), ending = lower_case(path.extension().string());
   for (const std::string_view of_voxels : {".img", ".img.gz"}) {
     if (name.ends_with(of_voxels)) return "holds the voxels of a pair of files alone; give the one that ends in .hdr";
@@ -228,12 +228,12 @@ std::string unread_form(const fs::path& path) {
   if (ending != ".mha" && ending != ".mhd") return {};
   file.clear();
   file.seekg(0);
-  const HeaderFields fields = header_fields(file, '=', "elementdatafile");
+  const MetaImageHeader header = meta_image_header(file);
   const std::streamoff header_bytes = file ? static_cast<std::streamoff>(file.tellg()) : -1;
   std::error_code error;
   const auto all_bytes = fs::file_size(path, error);
   const bool known = !error && header_bytes >= 0 && static_cast<std::uintmax_t>(header_bytes) <= all_bytes;
-  return unread_meta_image(path, fields, known ? all_bytes - static_cast<std::uintmax_t>(header_bytes) : 0);
+  return unread_meta_image(path, header, known ? all_bytes - static_cast<std::uintmax_t>(header_bytes) : 0);
 }
 
 }  // namespace birdseye::host

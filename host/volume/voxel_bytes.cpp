@@ -33,27 +33,26 @@ std::optional<Place> place_beside(const fs::path& header, const std::string& nam
 }
 
 std::optional<Place> place_in_nrrd(const fs::path& path, std::ifstream& file) {
-  const HeaderFields fields = header_fields(file, ':', "");
-  for (const char* skipped : {"line skip", "lineskip", "byte skip", "byteskip"})
+  const HeaderFields fields = nrrd_fields(file);
+  for (const char* skipped : {"line skip", "byte skip"})
     if (const std::string count = lower_case(field_of(fields, skipped)); !count.empty() && count != "0")
       return std::nullopt;
   const std::string encoding = lower_case(field_of(fields, "encoding"));
   const bool packed = encoding == "gzip" || encoding == "gz";
   if (!packed && encoding != "raw") return std::nullopt;
-  for (const char* name : {"data file", "datafile"})
-    if (const auto beside = fields.find(name); beside != fields.end())
-      return place_beside(path, beside->second, packed, true);
+  if (const auto beside = fields.find("data file"); beside != fields.end())
+    return place_beside(path, beside->second, packed, true);
   return Place{path, static_cast<std::streamoff>(file.tellg()), packed, true};
 }
 
 std::optional<Place> place_in_meta_image(const fs::path& path, std::ifstream& file) {
-  const HeaderFields fields = header_fields(file, '=', "elementdatafile");
-  const bool text = !field_of(fields, "binarydata").empty() && !says_true(fields, "binarydata");
-  if (field_of(fields, "ndims").empty() || text) return std::nullopt;
-  if (const std::string skipped = lower_case(field_of(fields, "headersize")); !skipped.empty() && skipped != "0")
+  const HeaderFields fields = meta_image_header(file).fields;
+  const bool text = !field_of(fields, "BinaryData").empty() && !says_true(fields, "BinaryData");
+  if (field_of(fields, "NDims").empty() || text) return std::nullopt;
+  if (const std::string skipped = lower_case(field_of(fields, "HeaderSize")); !skipped.empty() && skipped != "0")
     return std::nullopt;
-  const bool packed = says_true(fields, "compresseddata");
-  const auto beside = fields.find("elementdatafile");
+  const bool packed = says_true(fields, "CompressedData");
+  const auto beside = fields.find("ElementDataFile");
   if (beside == fields.end()) return std::nullopt;
   if (lower_case(beside->second) != "local") return place_beside(path, beside->second, packed, false);
   return Place{path, static_cast<std::streamoff>(file.tellg()), packed, false};

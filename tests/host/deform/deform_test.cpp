@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <random>
+#include <string>
 
 #include "host/deform/bezier_patch.hpp"
 #include "host/deform/displacement_field.hpp"
@@ -190,6 +191,15 @@ TEST(DisplacementField, RefusesWhatIsNoSoundField) {
   ASSERT_TRUE(write_field(scratch / "far.mha", far));
   EXPECT_NE(read_field(scratch / "far.mha").error().what.find("as an organ moves"), std::string::npos);
   EXPECT_FALSE(write_field(scratch / "field.txt", field_of(tree, oblique_box())));
+  // Its reader would turn the place of such a field to the patient's LPS, and no vectors.
+  ASSERT_TRUE(write_field(scratch / "lps.nrrd", field_of(*PatchOctree::uniform(1), oblique_box())));
+  std::string text = testing::contents_of(scratch / "lps.nrrd");
+  const std::string space = "left-posterior-superior";
+  ASSERT_NE(text.find(space), std::string::npos);
+  text.replace(text.find(space), space.size(), "right-anterior-superior");
+  const auto turned = read_field(scratch.file("ras.nrrd", text));
+  ASSERT_FALSE(turned);
+  EXPECT_NE(turned.error().what.find("in the space \"right-anterior-superior\""), std::string::npos);
 }
 
 TEST(DisplacementField, RefusesToTearOrToMissTheVolume) {

@@ -288,6 +288,72 @@ TEST(StatedGeometry, AFileThatDoesNotSayWhereItsFirstVoxelLiesIsReadWithANote) {
   EXPECT_NE(refused.error().what.find("no \"space origin\""), std::string::npos) << refused.error().what;
 }
 
+// Whatever the reason for which a reader takes a header otherwise than it is written.
+TEST(StatedGeometry, AMetaImageIsReadAsItsHeaderIsWritten) {
+  const Scratch scratch;
+  const std::string turn = "TransformMatrix = 0 1 0 -1 0 0 0 0 1\n", place = "Offset = 5 6 7\nOrigin = 5 6 7.0001\n";
+  const std::string text = kMeta + turn + place + "ElementSpacing = 1 1 2\nElementDataFile = LOCAL\n";
+  const fs::path path = scratch.file("a.mha", text + voxels({4, 3, 2}));
+  const auto read = read_image(path, 1);
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(misread_geometry(path, *read), "");
+  const auto told_of = [&](const auto& change) {
+    ImageFile other = *read;
+    change(other);
+    return misread_geometry(path, other);
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NE(told_of([axis](ImageFile& i) { i.spacing_mm[axis] += 0.001; }).find("ElementSpacing 1 1 2"),
+              std::string::npos);
+    EXPECT_NE(told_of([axis](ImageFile& i) { i.origin_mm[axis] = 0; }).find("Offset 5 6 7"), std::string::npos);
+    EXPECT_NE(told_of([axis](ImageFile& i) { i.axes.col(axis) *= -1; }).find("TransformMatrix 0 1 0 -1 0 0 0 0 1"),
+              std::string::npos);
+  }
+  // Where a person states which of two spacings is right, the reader takes the first.
+  const fs::path two = scratch.file("two.mha", kMeta + turn + place + "ElementSize = 1 1 3\nElementSpacing = 1 1 2\n" +
+                                                   "ElementDataFile = LOCAL\n" + voxels({4, 3, 2}));
+  EXPECT_TRUE(import_volume(stated(two, Eigen::Vector3d(1, 1, 3), "")));
+  // Of its Offset the reader takes what is said behind it by another name.
+  expect_refused(import_volume(fs::path(scratch.file(
+                     "other.mha", kMeta + turn + place + "ImagePosition = 7 8 9\n" +
+                                      "ElementSpacing = 1 1 2\nElementDataFile = LOCAL\n" + voxels({4, 3, 2})))),
+                 "other.mha", "says Offset 5 6 7 in its header, of which 7 8 9 is read");
+}
+
+TEST(StatedGeometry, TheVectorsOfAFieldAreThePatientsOrRefused) {
+  const Scratch scratch;
+  const auto field = [&](const std::string& name, const std::string& space, const std::string& frame) {
+    return scratch.file(name,
+                        "NRRD0005\ntype: float\ndimension: 4\nspace: " + space +
+                            "\nsizes: 3 4 3 2\nendian: little\nencoding: raw\nkinds: vector domain domain domain\n"
+                            "space directions: none (1,0,0) (0,1,0) (0,0,2)\nspace origin: (1,2,3)\n" +
+                            frame + "\n" + std::string(4 * 3 * 24, '\0'));
+  };
+  const std::string same = "measurement frame: (1,0,0) (0,1,0) (0,0,1)\n";
+  const std::string turned = "measurement frame: (-1,0,0) (0,-1,0) (0,0,1)\n";
+  for (const auto& [space, frame, why] : std::vector<std::array<std::string, 3>>{
+           {"LPS", "", ""},
+           {"left-posterior-superior", same, ""},
+           {"Left-Posterior-Superior", "measurementframe: (1,0,0) (0,1.0,0) (0,0,1)\n", ""},
+           {"LPS", turned, "\"measurement frame\" (-1,0,0) (0,-1,0) (0,0,1), by which its vectors are not turned"},
+           {"LPS", "measurementframe: (0,1,0) (1,0,0) (0,0,1)\n", "\"measurement frame\" (0,1,0)"},
+           {"LPS", "measurement frame: (nan,nan,nan) (nan,nan,nan) (nan,nan,nan)\n", "\"measurement frame\" (nan"},
+           {"RAS", "", "in the space \"RAS\", whose vectors would be taken for left-posterior-superior ones"},
+           {"right-anterior-superior", same, "in the space \"right-anterior-superior\""},
+           {"RAS", turned, "in the space \"RAS\""},
+           {"left-anterior-superior", "", "in the space \"left-anterior-superior\""}}) {
+    const auto read = read_image(field("field.nrrd", space, frame), 3);
+    EXPECT_EQ(read.has_value(), why.empty()) << space << ' ' << frame << (read ? "" : read.error().what);
+    if (read) continue;
+    EXPECT_NE(read.error().what.find("field.nrrd: "), std::string::npos) << read.error().what;
+    EXPECT_NE(read.error().what.find(why), std::string::npos) << read.error().what;
+  }
+  // A CT has no vectors: its reader turns all that it says.
+  EXPECT_TRUE(import_volume(fs::path(
+      scratch.file("ct.nrrd", kNrrd + "space: RAS\nspace directions: (1,0,0) (0,1,0) (0,0,2)\nspace origin: (1,2,3)\n" +
+                                  turned + "\n" + voxels({4, 3, 2})))));
+}
+
 TEST(StatedGeometry, LettersNameEachOfThe48AxesOnce) {
   int named = 0;
   const std::string all = "RLAPIS";

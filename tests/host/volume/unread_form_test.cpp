@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/base/lower_case.hpp"
 #include "host/volume/import.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -71,6 +72,22 @@ std::string nifti(std::int16_t datatype, std::int16_t bits, const char* magic = 
   return file;
 }
 
+/// A NIfTI-1 file with its voxels, of which one number of the header is another, at this byte of it.
+template <typename Number>
+std::string nifti_with(std::size_t at, Number number, const char* magic = "n+1") {
+  std::string file = nifti(4, 16, magic);
+  std::memcpy(file.data() + at, &number, sizeof number);
+  return magic[1] == '+' ? file + kVoxels : file.substr(0, 348);
+}
+
+constexpr std::size_t kOffset = 108, kSlope = 112, kUnits = 123;  // bytes of a NIfTI header
+
+std::string shifted(float slope, float intercept) {
+  std::string file = nifti_with(kSlope, slope);
+  std::memcpy(file.data() + kSlope + sizeof slope, &intercept, sizeof intercept);
+  return file;
+}
+
 TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
   const Scratch scratch;
   std::ofstream(scratch / "there.raw") << kVoxels;
@@ -120,9 +137,11 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
             "more than three dimensions"},
            {"quantised.nrrd", nrrd("short", "raw", "endian: little\nold min: -1000\nold max: 3000\n") + "\n" + kVoxels,
             "stand for other values (\"old min\" -1000)"},
-           {"oldmax.nrrd", nrrd("uchar", "raw", "oldmax: 3000\n") + "\n" + kVoxels.substr(24), "\"oldmax\" 3000"},
+           {"oldmax.nrrd", nrrd("uchar", "raw", "oldmax: 3000\n") + "\n" + kVoxels.substr(24), "\"old max\" 3000"},
            {"unquantised.nrrd", nrrd("short", "raw", "endian: little\nold min: nan\n") + "\n" + kVoxels, ""},
            {"lone.nhdr", nrrd() + "data file: gone.raw\n\n", "\"gone.raw\" is not there"},
+           {"one_word.nhdr", nrrd() + "datafile: LIST\nthere.raw\ngone.raw\n", "\"gone.raw\" is not there"},
+           {"units.nrrd", nrrd() + "spaceunits: \"cm\" \"cm\" \"cm\"\n\n" + kVoxels, "lengths in \"cm\""},
            {"list.nhdr", nrrd() + "data file: LIST\nthere.raw\ngone.raw\n", "\"gone.raw\" is not there"},
            {"dotted.nhdr", nrrd() + "data file: ./there.raw\n\n", ""},
            {"below.nhdr", nrrd() + "data file: below/there.raw\n\n", "in another folder (\"below/there.raw\")"},
@@ -180,9 +199,21 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
            {"wide.nii", nifti(1536, 128) + kVoxels, "floats of 128 bits"},
            {"unknown.nii", nifti(77, 16) + kVoxels, "the datatype 77"},
            {"two.nii", nifti(4, 32) + kVoxels, "16 bits by its datatype (4), 32 by its bitpix"},
+           {"unplaced.nii", nifti_with(kOffset, 0.0F), "begin at byte 0 (vox_offset), within its header"},
+           {"in_header.nii", nifti_with(kOffset, 348.0F), "begin at byte 348 (vox_offset)"},
+           {"placed.nii", nifti_with(kOffset, 353.0F) + "\n", ""},
+           {"scaled.nii", shifted(0.5F, -1000), ""},
+           {"unscaled.nii", shifted(0, 0), ""},
+           {"shifted.nii", shifted(0, -1000), "a scl_slope of 0, by which NIfTI takes the values as they are stored"},
+           {"inverted.nii", shifted(-1, 0), "a scl_slope of -1, below 0"},
+           {"unitless.nii", nifti_with(kUnits, '\0'), ""},
+           {"seconds.nii", nifti_with(kUnits, '\x0a'), ""},
+           {"no_unit.nii", nifti_with(kUnits, '\5'), "in the unit 5 (xyzt_units), which NIfTI does not know"},
+           {"no_unit_in_seconds.nii", nifti_with(kUnits, '\x0c'), "in the unit 4 (xyzt_units)"},
            {"second.nii", std::string("\x1c\x02\0\0n+2\0", 8) + std::string(600, '\0'), "another version than 1"},
            {"lone.hdr", nifti(4, 16, "ni1"), "the file of its voxels, lone.img"},
            {"pair.hdr", nifti(4, 16, "ni1").substr(0, 348), ""},
+           {"inverted.hdr", nifti_with(kSlope, -1.0F, "ni1"), "a scl_slope of -1, below 0"},
            {"pair.nii", nifti(4, 16, "ni1"), "name it .hdr, beside its .img"},
            {"zipped.hdr.gz", gzip(nifti(4, 16, "ni1").substr(0, 348)), ""},
            {"voxels.img", kVoxels, "give the one that ends in .hdr"}}) {
@@ -191,6 +222,52 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
     if (read) continue;
     EXPECT_NE(read.error().what.find(c.name + ": "), std::string::npos) << read.error().what;
     EXPECT_NE(read.error().what.find(c.why), std::string::npos) << read.error().what;
+  }
+}
+
+/// Says of a MetaImage's header, in which this line stands instead of that one, what is refused; empty: it is read.
+std::string refusal_of(const Scratch& scratch, const std::string& line, const std::string& instead) {
+  const fs::path path = scratch.file("one.mha", with(meta_image(), line, instead) + kVoxels);
+  const auto read = import_volume(path);
+  return read ? std::string() : read.error().what;
+}
+
+// Their reader, MetaIO, takes no other spelling of a name and ':' for '='; what it passes over it fills in.
+TEST(UnreadForm, ANameOfAMetaImageIsSpeltAsItsReaderSpellsIt) {
+  const Scratch scratch;
+  for (const char* line : {"NDims = 3", "BinaryDataByteOrderMSB = False", "TransformMatrix = 1 0 0 0 1 0 0 0 1",
+                           "Offset = 1 2 3", "ElementSpacing = 1 1 2", "DimSize = 4 3 2", "ElementType = MET_SHORT"}) {
+    const std::string right(line), name = right.substr(0, right.find(' '));
+    ASSERT_EQ(refusal_of(scratch, right, right), "");
+    EXPECT_EQ(refusal_of(scratch, right, "\n" + right + "\t"), "") << "blanks and blank lines do not matter";
+    std::string small = right, first = right, colon = right, both = right;
+    small[0] = static_cast<char>(small[0] - 'A' + 'a');
+    first.replace(0, name.size(), lower_case(name));
+    colon.replace(name.size() + 1, 1, ":");
+    both.replace(name.size() + 1, 1, ":=");
+    for (const std::string& wrong : {small, first, colon, both}) {
+      for (const std::string& instead : {wrong, right + "\n" + wrong, wrong + "\n" + right}) {
+        const std::string told = refusal_of(scratch, right, instead);
+        EXPECT_NE(told.find("has the line \"" + wrong + "\""), std::string::npos) << instead << ": " << told;
+        EXPECT_NE(told.find("write it as \"" + name + " = "), std::string::npos) << instead << ": " << told;
+      }
+    }
+  }
+  for (const char* more : {"elementsize = 1 1 3\n", "DistanceUnits : cm\n", "distanceunits = cm\n",
+                           "elementtointensityfunctionslope = 2\n", "elementdatafile = LOCAL\nDistanceUnits = cm\n"}) {
+    const std::string told = refusal_of(scratch, "NDims", more + std::string("NDims"));
+    EXPECT_NE(told.find("has the line \""), std::string::npos) << more << ": " << told;
+  }
+  // Names that are nobody's but the writer's are spelt as the writer likes.
+  EXPECT_EQ(refusal_of(scratch, "NDims", "comment : none\nSeq_Frame0000 : a = b\nNDims"), "");
+}
+
+// MetaIO takes the value of the line behind it for that of a line without a sign, and knows nothing of that line.
+TEST(UnreadForm, ALineOfAMetaImageThatHidesTheNextOneIsRefused) {
+  const Scratch scratch;
+  for (const char* line : {"Offset = 1 2 3", "ElementSpacing = 1 1 2"}) {
+    const std::string told = refusal_of(scratch, line, std::string("hidden\n") + line);
+    EXPECT_NE(told.find("has the line \"hidden\" in its header, which has no \"=\""), std::string::npos) << told;
   }
 }
 
