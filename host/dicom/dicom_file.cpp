@@ -110,20 +110,27 @@ void read_keys(DcmDataset& dataset, const FrameElements& elements, DicomSlice& s
   }
 }
 
-/// Whether the file has all of its pixels, which are its last element or nearly so. Empty, or what is wrong.
-std::string missing_pixels(DcmDataset& dataset, const fs::path& path, std::size_t pixel_bytes) {
+/// Whether the file has all of its pixels, which are its last element or nearly so, and none beyond them. spare_bytes:
+/// how many bytes more are padding. Empty, or what is wrong.
+std::string wrong_pixel_bytes(DcmDataset& dataset, const fs::path& path, std::size_t pixel_bytes,
+                              std::size_t spare_bytes) {
   DcmElement* element = nullptr;
   if (dataset.findAndGetElement(DCM_PixelData, element).bad() || element == nullptr)
     return "holds no pixels; copy it again";
   auto* const pixels = dynamic_cast<DcmPixelData*>(element);
   if (pixels == nullptr) return "holds no pixels that can be read; export it again";
   if (DcmXfer(dataset.getOriginalXfer()).isEncapsulated())
-    return {};  // a sequence that ends, or it had not been loaded
+    return {};  // a sequence that ends, or it had not been loaded; DicomPixels holds its size against the header
   std::error_code error;
   const auto file_bytes = fs::file_size(path, error);
   const bool deflated = dataset.getOriginalXfer() == EXS_DeflatedLittleEndianExplicit;
   const std::size_t has = pixels->getLength(dataset.getOriginalXfer());
   if (has < pixel_bytes || (!deflated && (error || file_bytes < has))) return "is cut short; copy it again";
+  if (has > pixel_bytes + spare_bytes) {
+    return fmt::format(
+        "has {} bytes of pixels where its Rows, Columns, Bits Allocated and Number of Frames say {}; export it again",
+        has, pixel_bytes);
+  }
   return {};
 }
 
@@ -179,9 +186,12 @@ std::string read_slices(DcmDataset& dataset, DicomFile& file) {
   }
   if (text_of(dataset, DCM_PhotometricInterpretation) != "MONOCHROME2")
     return "is not MONOCHROME2, as a CT is; export it again";
-  const std::size_t pixel_bytes = static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns) *
-                                  static_cast<std::size_t>(frames) * static_cast<std::size_t>(bits / 8);
-  if (std::string missing = missing_pixels(dataset, file.path, pixel_bytes); !missing.empty()) return missing;
+  const auto wide = static_cast<std::size_t>(columns), high = static_cast<std::size_t>(rows),
+             bytes_each = static_cast<std::size_t>(bits / 8);
+  const std::size_t pixel_bytes = wide * high * static_cast<std::size_t>(frames) * bytes_each;
+  // A row or a column more is no padding: of a picture that small, a byte that makes the length even still is.
+  const std::size_t spare_bytes = std::max(std::min(wide, high) * bytes_each - 1, std::size_t{1});
+  if (std::string wrong = wrong_pixel_bytes(dataset, file.path, pixel_bytes, spare_bytes); !wrong.empty()) return wrong;
   DcmItem* const shared = item_of(dataset, DCM_SharedFunctionalGroupsSequence);
   file.slices.resize(static_cast<std::size_t>(frames));
   for (int i = 0; i < frames; ++i) {

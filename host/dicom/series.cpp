@@ -10,8 +10,10 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 
+#include "host/dicom/dicom_pixels.hpp"
 #include "host/dicom/phase_words.hpp"
 #include "host/dicom/slice_volumes.hpp"
 
@@ -39,6 +41,13 @@ SeriesInfo info_of(const Files& files) {
   return info;
 }
 
+/// Makes a file that is not as it should be a fault of the series.
+void blame(Series& series, const std::filesystem::path& bad, const std::string& fault) {
+  series.bad = bad;
+  series.fault = fault;
+  series.info.problem = fmt::format("{} {}", bad.filename().string(), fault);
+}
+
 /// A series of files that are no slices, or one of which has a fault.
 Series without_volume(const Files& files) {
   Series series;
@@ -57,11 +66,7 @@ Series without_volume(const Files& files) {
   constexpr std::int64_t kMost = std::numeric_limits<int>::max();
   series.info.size = {first.columns, first.rows, static_cast<int>(std::min(frames, kMost))};
   const auto bad = std::find_if(files.begin(), files.end(), [](const DicomFile* file) { return !file->fault.empty(); });
-  if (bad != files.end()) {
-    series.bad = (*bad)->path;
-    series.fault = (*bad)->fault;
-    series.info.problem = fmt::format("{} {}", (*bad)->path.filename().string(), (*bad)->fault);
-  }
+  if (bad != files.end()) blame(series, (*bad)->path, (*bad)->fault);
   return series;
 }
 
@@ -121,28 +126,78 @@ bool are_alike(const std::filesystem::path& a, const std::filesystem::path& b) {
   std::error_code error;
   if (std::filesystem::file_size(a, error) != std::filesystem::file_size(b, error) || error) return false;
   std::ifstream of_a(a, std::ios::binary), of_b(b, std::ios::binary);
-  return of_a && of_b && std::equal(std::istreambuf_iterator<char>(of_a), {}, std::istreambuf_iterator<char>(of_b), {});
+  std::vector<char> block_a(std::size_t{1} << 16U), block_b(block_a.size());
+  while (of_a && of_b) {
+    of_a.read(block_a.data(), static_cast<std::streamsize>(block_a.size()));
+    of_b.read(block_b.data(), static_cast<std::streamsize>(block_b.size()));
+    if (of_a.gcount() != of_b.gcount() ||
+        !std::equal(block_a.begin(), block_a.begin() + of_a.gcount(), block_b.begin()))
+      return false;
+  }
+  return of_a.eof() && of_b.eof();
 }
 
-/// Without the files that lie in another folder too, as where an export was copied into itself, and without those that
-/// are the same as another of their folder. Two of one folder that differ stay, and are named as lying at the same
-/// place.
-Files without_copies(const Files& files, std::vector<std::filesystem::path>& copies) {
+/// Whether two slices lie at the same place, as large.
+bool lie_alike(const DicomSlice& a, const DicomSlice& b) {
+  return a.columns == b.columns && a.rows == b.rows && a.position_mm == b.position_mm && a.row == b.row &&
+         a.column == b.column && a.spacing_mm == b.spacing_mm;
+}
+
+/// The Hounsfield units of all frames of a file; none where one cannot be decoded.
+std::optional<std::vector<std::int16_t>> hu_of(const DicomFile& file) {
+  DicomPixels pixels;
+  std::vector<std::int16_t> hu;
+  for (const DicomSlice& slice : file.slices) {
+    if (!pixels.append_hu(file.path, slice, hu)) return std::nullopt;
+  }
+  return hu;
+}
+
+/// Whether two files hold the same slices, however each stores them: a program that copies files may change their
+/// headers, or compress them.
+bool hold_the_same(const DicomFile& a, const DicomFile& b) {
+  if (!std::equal(a.slices.begin(), a.slices.end(), b.slices.begin(), b.slices.end(), lie_alike)) return false;
+  if (are_alike(a.path, b.path)) return true;
+  const auto hu = hu_of(a);
+  return hu && hu == hu_of(b);
+}
+
+/// The files of a series, each slice once.
+struct FilesOnce {
+  Files files;
+  std::vector<std::filesystem::path> copies;  ///< that were left out
+  std::filesystem::path odd;                  ///< one of two files of which nobody knows which is right; empty: none
+  std::string fault;                          ///< of odd
+};
+
+/// Without the files that hold the same as another one of their SOP Instance UID, as where an export was copied into
+/// itself. Two of one folder that differ stay, and are named as lying at the same place; of two folders, they are a
+/// fault, for neither folder tells which of the two belongs to the series.
+FilesOnce without_copies(const Files& files) {
   std::map<std::string, Files> known;
-  Files once;
+  FilesOnce out;
   for (const DicomFile* file : files) {
     Files& alike = known[file->instance_uid];
-    const bool copy = !file->instance_uid.empty() && std::any_of(alike.begin(), alike.end(), [&](const DicomFile* one) {
-      return one->path.parent_path() != file->path.parent_path() || are_alike(one->path, file->path);
-    });
-    if (copy) {
-      copies.push_back(file->path);
+    const bool named = !file->instance_uid.empty();
+    if (named &&
+        std::any_of(alike.begin(), alike.end(), [&](const DicomFile* one) { return hold_the_same(*one, *file); })) {
+      out.copies.push_back(file->path);
       continue;
     }
+    const auto elsewhere = std::find_if(alike.begin(), alike.end(), [&](const DicomFile* one) {
+      return one->path.parent_path() != file->path.parent_path();
+    });
+    if (named && elsewhere != alike.end() && out.odd.empty()) {
+      out.odd = file->path;
+      out.fault = fmt::format(
+          "has the SOP Instance UID (0008,0018) of {}, and other pixels or another place; remove the one that does not "
+          "belong to the series",
+          (*elsewhere)->path.string());
+    }
     alike.push_back(file);
-    once.push_back(file);
+    out.files.push_back(file);
   }
-  return once;
+  return out;
 }
 
 /// Of the slices that files of one series hold. A localizer that lies in a series is no slice of its volume.
@@ -198,9 +253,12 @@ std::vector<Series> sort_into_series(const std::vector<DicomFile>& files, bool u
                                    [](const DicomFile* file) { return !file->slices.empty() && file->fault.empty(); });
     const std::size_t had = out.size();
     if (whole) {
-      std::vector<std::filesystem::path> copies;
-      add_volumes(without_copies(of_series, copies), files, untilt, out);
-      for (std::size_t i = had; i < out.size(); ++i) out[i].copies = copies;
+      const FilesOnce once = without_copies(of_series);
+      add_volumes(once.files, files, untilt, out);
+      for (std::size_t i = had; i < out.size(); ++i) {
+        out[i].copies = once.copies;
+        if (!once.odd.empty()) blame(out[i], once.odd, once.fault);
+      }
     } else {
       out.push_back(without_volume(of_series));
     }
@@ -216,9 +274,7 @@ void blame_neighbours(std::vector<Series>& series, const std::vector<DicomFile>&
       return files[slice.file].path.parent_path() == unreadable.parent_path();
     });
     if (!beside || one.info.passed_over || !one.bad.empty()) continue;
-    one.bad = unreadable;
-    one.fault = why;
-    one.info.problem = fmt::format("{} {}", unreadable.filename().string(), why);
+    blame(one, unreadable, why);
   }
 }
 

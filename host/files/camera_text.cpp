@@ -11,6 +11,7 @@
 #include <set>
 #include <vector>
 
+#include "calibration/base/lower_case.hpp"
 #include "host/files/opencv_numbers.hpp"
 #include "host/files/stored_matrix.hpp"
 
@@ -68,7 +69,32 @@ Error stands_twice(const std::string& key) {
 }
 
 Error unknown_model(const char* key, const std::string& model) {
-  return {Errc::unsupported, fmt::format("{} {} cannot be said by a lens here{}", key, model, kAnotherModel)};
+  return {Errc::unsupported, fmt::format("its {} {} cannot be said by a lens here{}", key, model, kAnotherModel)};
+}
+
+/// Refuses by name a file whose numbers are meant for another model than a lens here has, whatever their count. said:
+/// what the file has under a key, as text; none where the file lacks the key.
+template <typename Said>
+Result<void> refuse_other_models(const Said& said) {
+  const std::string fisheye = lower_case(said("fisheye_model").value_or("0"));
+  if (fisheye != "0" && fisheye != "false") return unknown_model("fisheye_model", fisheye);
+  if (const auto xi = said("xi")) return unknown_model("xi (of an omnidirectional camera)", *xi);
+  for (const char* key : {"distortion_model", "camera_model"}) {
+    const std::string model = lower_case(said(key).value_or(""));
+    if (!model.empty() && model != "plumb_bob" && model != "radtan" && model != "rational_polynomial" &&
+        model != "pinhole") {
+      return unknown_model(key, model);
+    }
+  }
+  return {};
+}
+
+/// What the node holds, as text; none where there is no node.
+std::optional<std::string> words_of(const cv::FileNode& node) {
+  if (node.empty()) return std::nullopt;
+  if (node.isString()) return static_cast<std::string>(node);
+  if (node.isInt() || node.isReal()) return fmt::format("{:g}", static_cast<double>(node));
+  return "[..]";
 }
 
 /// A key that stands twice in the map, or in one of the maps right in it. Empty where there is none.
@@ -98,6 +124,8 @@ Result<CameraModel> opencv_camera(const std::string& text) {
   try {
     const cv::FileStorage file(text, kInMemory);
     if (const std::string twice = twice_in(file.root()); !twice.empty()) return stands_twice(twice);
+    if (const auto sound = refuse_other_models([&file](const char* key) { return words_of(file[key]); }); !sound)
+      return sound.error();
     if (!file["image_width"].isInt() || !file["image_height"].isInt())
       return Error{Errc::bad_format, "lacks image_width and image_height; add the size the lens was calibrated at"};
     camera.width_px = static_cast<int>(file["image_width"]);
@@ -129,6 +157,12 @@ int whole_of(const YAML::Node& node) {
 Numbers numbers_of(const YAML::Node& node) {
   if (node.IsScalar()) return {static_cast<double>(whole_of(node))};
   return (node.IsMap() ? node["data"] : node).as<Numbers>();
+}
+
+/// What the node holds, as text; none where there is no node.
+std::optional<std::string> words_of(const YAML::Node& node) {
+  if (!node) return std::nullopt;
+  return node.IsScalar() ? node.Scalar() : "[..]";
 }
 
 /// Numbers under the first of the keys that is there. Nothing where none is there.
@@ -174,9 +208,8 @@ Result<CameraModel> ros_camera(const YAML::Node& node) {
   camera.width_px = whole_of(width);
   camera.height_px = whole_of(height);
   if (!node["distortion_model"]) return lacks_distortion("distortion_model");
-  const auto model = node["distortion_model"].as<std::string>();
-  if (model != "plumb_bob" && model != "rational_polynomial" && !model.empty())
-    return unknown_model("its distortion_model", model);
+  if (const auto sound = refuse_other_models([&node](const char* key) { return words_of(node[key]); }); !sound)
+    return sound.error();
   for (const char* binning : {"binning_x", "binning_y"}) {
     if (node[binning] && whole_of(node[binning]) > 1)
       return Error{Errc::unsupported,
@@ -206,10 +239,10 @@ Result<CameraModel> ros_camera(const YAML::Node& node) {
 
 Result<CameraModel> kalibr_camera(const YAML::Node& node) {
   const auto model = node["camera_model"].as<std::string>();
-  if (model != "pinhole") return unknown_model("its camera_model", model);
+  if (model != "pinhole") return unknown_model("camera_model", model);
   if (!node["distortion_model"]) return lacks_distortion("distortion_model");
   const auto distortion = node["distortion_model"].as<std::string>();
-  if (distortion != "radtan" && distortion != "none") return unknown_model("its distortion_model", distortion);
+  if (distortion != "radtan" && distortion != "none") return unknown_model("distortion_model", distortion);
   if (distortion == "radtan" && !node["distortion_coeffs"]) return lacks_distortion("distortion_coeffs");
   const auto size = node["resolution"].as<std::vector<YAML::Node>>();
   const Numbers f = node["intrinsics"].as<Numbers>();

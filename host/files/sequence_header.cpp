@@ -30,20 +30,26 @@ std::optional<std::pair<std::string_view, std::string_view>> field_of(std::strin
   return std::pair{bare(line.substr(0, line[equals - 1] == ':' ? equals - 1 : equals)), bare(line.substr(equals + 1))};
 }
 
-/// twice: the name of a field that stands twice with different values, of which one reader takes the first, another the
-/// last.
+/// What has come of the lines so far.
+struct Taken {
+  std::size_t fields = 0;
+  std::string twice;  ///< the name of a field that stands twice with different values, of which one reader takes the
+                      ///< first, another the last
+};
+
 void put(SequenceHeader::Fields& fields, std::string_view key, std::string_view name, std::string_view value,
-         std::string& twice) {
+         Taken& taken) {
   const auto [field, is_new] = fields.emplace(key, value);
-  if (!is_new && field->second != value) twice = name;
+  if (is_new) ++taken.fields;
+  if (!is_new && field->second != value) taken.twice = name;
 }
 
-void take_line(std::string_view line, SequenceHeader& header, std::string& twice) {
+void take_line(std::string_view line, SequenceHeader& header, Taken& taken) {
   const auto field = field_of(line);
   if (!field) return;
   std::string_view key = field->first;
   if (!key.starts_with(kFrame)) {
-    if (!key.starts_with('#')) put(header.fields, key, key, field->second, twice);
+    if (!key.starts_with('#')) put(header.fields, key, key, field->second, taken);
     return;
   }
   key.remove_prefix(kFrame.size());
@@ -52,22 +58,31 @@ void take_line(std::string_view line, SequenceHeader& header, std::string& twice
   if (error != std::errc() || end == key.data() + key.size() || *end != '_') return;
   key.remove_prefix(static_cast<std::size_t>(end - key.data()) + 1);
   if (key.ends_with(kTransformField)) header.transforms.emplace(key.substr(0, key.size() - kTransformField.size()));
-  put(header.frames[number], key, field->first, field->second, twice);
+  put(header.frames[number], key, field->first, field->second, taken);
 }
 
 }  // namespace
 
-Result<SequenceHeader> read_sequence_header(const fs::path& path) {
+Result<SequenceHeader> read_sequence_header(const fs::path& path, const HeaderBounds& most) {
   std::error_code ignored;
   if (!fs::is_regular_file(path, ignored))
     return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
   std::ifstream in(path, std::ios::binary);
   if (!in) return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
   SequenceHeader header;
-  std::string line, twice;
+  std::string line;
+  Taken taken;
+  std::uint64_t bytes = 0;
   for (bool nrrd = false, first = true; next_line(in, line, kLongestLine); first = false) {
     if (first) nrrd = line.starts_with("NRRD");
-    take_line(line, header, twice);
+    take_line(line, header, taken);
+    bytes += line.size() + 1;
+    if (taken.fields > most.fields || bytes > most.bytes) {
+      return Error{Errc::unsupported,
+                   fmt::format("{}: its header has more than the {} fields or {:.0f} MB of text that are read; divide "
+                               "the recording into shorter ones, or give a sequence's file",
+                               path.string(), most.fields, static_cast<double>(most.bytes) / 1e6)};
+    }
     // Here the header ends and the pixels begin.
     if (line.starts_with("ElementDataFile") || (nrrd && (line.empty() || line == "\r"))) {
       header.whole = true;
@@ -77,9 +92,9 @@ Result<SequenceHeader> read_sequence_header(const fs::path& path) {
     }
   }
   if (in.bad()) return Error{Errc::unreadable, fmt::format("{}: {}", path.string(), kNotReadToItsEnd)};
-  if (!twice.empty() && (header.whole || !header.frames.empty())) {
+  if (!taken.twice.empty() && (header.whole || !header.frames.empty())) {
     return Error{Errc::bad_format, fmt::format("{}: has {} twice, with different values; keep the line that is right",
-                                               path.string(), twice.substr(0, 80))};
+                                               path.string(), taken.twice.substr(0, 80))};
   }
   return header;
 }

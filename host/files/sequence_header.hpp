@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -31,9 +32,17 @@ struct SequenceHeader {
   std::uint64_t data_offset = 0;         ///< where in the file the header ends
 };
 
-/// Reads the header. Refuses, naming the file, what is not there, cannot be opened or cannot be read to its end, and a
-/// field that stands twice with different values. A file without such fields gives an empty header.
-Result<SequenceHeader> read_sequence_header(const std::filesystem::path& path);
+/// What is read of a header at most: memory takes some 250 bytes a field beside its text. An hour of 100 frames a
+/// second with 20 fields each, matrices among them, has 7.2 million fields and 0.8 GB of text.
+struct HeaderBounds {
+  std::size_t fields = 8'000'000;
+  std::uint64_t bytes = std::uint64_t{1} << 30U;
+};
+
+/// Reads the header. Refuses, naming the file, what is not there, cannot be opened or cannot be read to its end, a
+/// field that stands twice with different values, and a header beyond the bounds. A file without such fields gives an
+/// empty header.
+Result<SequenceHeader> read_sequence_header(const std::filesystem::path& path, const HeaderBounds& most = {});
 
 std::string_view value_of(const SequenceHeader::Fields& fields, std::string_view key);
 

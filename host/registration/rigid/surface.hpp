@@ -18,8 +18,9 @@ struct Surface {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// Reads a surface: VTK's legacy polygons (.vtk), PLY, STL or OBJ. Refuses, in one line that names the path, what is
-/// missing, unreadable, damaged, cut short, has a corner beyond kFarthestMm, or holds no triangles.
+/// Reads a surface: VTK's legacy polygons (.vtk), PLY, STL or OBJ, by name and by content. Refuses, in one line that
+/// names the path, what is of another form, missing, unreadable, damaged, cut short, says that it is in another frame
+/// than LPS (SPACE=RAS, as 3D Slicer does), has a corner beyond kFarthestMm, or holds no triangles.
 Result<Surface> read_surface(const std::filesystem::path& path);
 
 /// The point of a surface that is nearest to a given point.

@@ -1,15 +1,17 @@
 #include <fmt/format.h>
 #include <itkVTKPolyDataMeshIO.h>
 
+#include <assimp/BaseImporter.h>
 #include <assimp/DefaultIOSystem.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <algorithm>
 #include <assimp/Importer.hpp>
-#include <cmath>
-#include <cstring>
+#include <cctype>
 #include <fstream>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -61,11 +63,10 @@ Surface decode_vtk(const fs::path& path) {
   return surface;
 }
 
-/// Opens the surface's own file alone. Another one that is there and is asked for may hold some of its triangles,
-/// unless it is a material.
+/// Opens the surface's own file alone: the material that an OBJ names is no part of a surface.
 class OwnFile : public Assimp::DefaultIOSystem {
  public:
-  OwnFile(fs::path own, std::string* asked_for) : own_(std::move(own)), asked_for_(asked_for) {}
+  explicit OwnFile(fs::path own) : own_(std::move(own)) {}
   using Assimp::DefaultIOSystem::Exists;
   using Assimp::DefaultIOSystem::Open;
   bool Exists(const char* file) const override { return is_own(file) && Assimp::DefaultIOSystem::Exists(file); }
@@ -76,20 +77,27 @@ class OwnFile : public Assimp::DefaultIOSystem {
  private:
   bool is_own(const fs::path& file) const {
     std::error_code ignored;
-    if (file == own_ || fs::equivalent(file, own_, ignored)) return true;
-    if (lower_case(own_.extension().string()) != ".obj" && fs::is_regular_file(file, ignored))
-      *asked_for_ = file.filename().string();
-    return false;
+    return file == own_ || fs::equivalent(file, own_, ignored);
   }
 
   fs::path own_;
-  std::string* asked_for_;
 };
 
-/// beside: a file that holds some of it; empty: none.
-Surface decode_others(const fs::path& path, std::string& beside) {
+/// Leaves the importer the reader of one form: of the others, some move, turn or scale what they read, and which reads
+/// a file its content decides too.
+void keep_reader(Assimp::Importer& importer, const std::string& extension) {
+  for (std::size_t i = importer.GetImporterCount(); i-- > 0;) {
+    if (extension == importer.GetImporterInfo(i)->mFileExtensions) continue;
+    const std::unique_ptr<Assimp::BaseImporter> other(importer.GetImporter(i));
+    importer.UnregisterLoader(other.get());
+  }
+}
+
+/// A PLY, STL or OBJ; extension: which, as "ply".
+Surface decode_others(const fs::path& path, const std::string& extension) {
   Assimp::Importer importer;
-  importer.SetIOHandler(new OwnFile(path, &beside));  // and owns it from here
+  keep_reader(importer, extension);
+  importer.SetIOHandler(new OwnFile(path));  // and owns it from here
   const aiScene* scene =
       importer.ReadFile(path.string(), aiProcess_Triangulate | aiProcess_JoinIdenticalVertices | aiProcess_SortByPType);
   Surface surface;
@@ -114,14 +122,70 @@ std::vector<T> taken(const Receive& receive) {
   return receive_values<T>(receive, count).value_or(std::vector<T>());
 }
 
-/// Whether it is a PLY whose header has no end: its reader seeks one for ever.
-bool is_endless_ply(const fs::path& path) {
+constexpr const char* kForms = "export it as PLY, STL, OBJ or VTK polygons";
+
+/// "ply" of skin.PLY; empty where there is none.
+std::string extension_of(const fs::path& path) {
+  const std::string dotted = lower_case(path.extension().string());
+  return dotted.empty() ? dotted : dotted.substr(1);
+}
+
+/// Of a file's first bytes, as many as the longest header of a PLY may have.
+std::string head_of(const fs::path& path) {
   constexpr std::streamsize kLongestHeader = 1 << 16;
   std::ifstream file(path, std::ios::binary);
   std::string head(kLongestHeader, '\0');
   file.read(head.data(), kLongestHeader);
   head.resize(static_cast<std::size_t>(file.gcount()));
-  return head.starts_with("ply") && head.find("end_header") == std::string::npos;
+  return head;
+}
+
+/// Whether a binary STL may begin so: its header is followed by a count, the highest byte of which is no letter.
+bool may_be_stl(const std::string& head) {
+  constexpr std::size_t kHeadBytes = 84;
+  const std::size_t word = std::min(head.find_first_not_of(" \t\r\n"), head.size());
+  return lower_case(head.substr(word, 5)) == "solid" ||
+         (head.size() >= kHeadBytes && static_cast<unsigned char>(head[kHeadBytes - 1]) < ' ');
+}
+
+/// What is wrong with a file that is none of the four forms, by its name or by its first bytes. Empty where nothing is.
+std::string wrong_form(const std::string& extension, const std::string& head) {
+  if (extension != "stl" && extension != "ply" && extension != "obj" && extension != "vtk")
+    return fmt::format("is no STL, PLY, OBJ or VTK by its name; {}", kForms);
+  const bool right = extension == "stl"   ? may_be_stl(head)
+                     : extension == "ply" ? head.starts_with("ply\n") || head.starts_with("ply\r")
+                     : extension == "vtk" ? head.starts_with("# vtk DataFile")
+                                          : true;  // an OBJ may begin by anything
+  if (right) return {};
+  return fmt::format("is named .{} and does not begin as one does; {}", extension, kForms);
+}
+
+/// Where in a file's first bytes its triangles begin: what stands before it is for people, and of an OBJ all may be.
+std::size_t end_of_remarks(const std::string& extension, const std::string& head) {
+  const std::size_t line = head.find('\n');
+  if (extension == "ply") return head.find("end_header");
+  if (extension == "stl") return line == std::string::npos ? line : std::max(line, std::size_t{80});
+  if (extension == "vtk" && line != std::string::npos) return head.find('\n', line + 1);
+  return std::string::npos;
+}
+
+bool is_of_a_word(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_';
+}
+
+/// The frame of a surface that 3D Slicer wrote, as "RAS" of the remark "SPACE=RAS", where it is not LPS. Empty where it
+/// is, or where the file says none.
+std::string other_space(const std::string& remarks) {
+  constexpr std::string_view kSays = "SPACE=";
+  for (std::size_t at = 0; (at = remarks.find(kSays, at)) != std::string::npos;) {
+    const bool begins = at == 0 || !is_of_a_word(remarks[at - 1]);
+    at += kSays.size();
+    const auto first = remarks.begin() + static_cast<std::ptrdiff_t>(at);
+    const std::string space(first, std::find_if_not(first, remarks.end(), is_of_a_word));
+    const bool is_lps = lower_case(space) == "lps" || lower_case(space) == "left-posterior-superior";
+    if (begins && !space.empty() && !is_lps) return space;
+  }
+  return {};
 }
 
 }  // namespace
@@ -132,20 +196,30 @@ Result<Surface> read_surface(const fs::path& path) {
     return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
   if (!std::ifstream(path))
     return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
-  if (is_endless_ply(path))
+  const std::string extension = extension_of(path);
+  const std::string head = head_of(path);
+  if (const std::string wrong = wrong_form(extension, head); !wrong.empty())
+    return Error{Errc::unsupported, fmt::format("{}: {}", path.string(), wrong)};
+  if (extension == "ply" && head.find("end_header") == std::string::npos) {  // its reader would seek one for ever
     return Error{
         Errc::bad_format,
         fmt::format("{}: is cut short in its header, which has no end_header; export it again", path.string())};
+  }
+  if (const std::string space = other_space(head.substr(0, end_of_remarks(extension, head))); !space.empty()) {
+    return Error{Errc::unsupported,
+                 fmt::format("{}: says SPACE={}, and a surface is read in LPS; save it again in LPS (3D Slicer: "
+                             "coordinate system LPS, in the options of Save)",
+                             path.string(), space.substr(0, 40))};
+  }
   constexpr Duration kLongest = Duration::from_ms(60'000);
   Surface surface;
-  std::string beside, flaw;
+  std::string flaw;
   const auto ran = run_confined_to(
       path, {},
-      [&path](const Send& send, std::vector<ProcessCopy>&) {
-        std::string asked_for;
+      [&path, &extension](const Send& send, std::vector<ProcessCopy>&) {
         const std::string flawed = flaw_of_surface(path);
         Surface decoded;
-        if (flawed.empty()) decoded = path.extension() == ".vtk" ? decode_vtk(path) : decode_others(path, asked_for);
+        if (flawed.empty()) decoded = extension == "vtk" ? decode_vtk(path) : decode_others(path, extension);
         const auto put = [&send](const auto& values) {
           const std::uint64_t count = values.size();
           send(&count, sizeof count);
@@ -153,14 +227,11 @@ Result<Surface> read_surface(const fs::path& path) {
         };
         put(decoded.vertices_mm);
         put(decoded.triangles);
-        put(asked_for);
         put(flawed);
       },
-      [&surface, &beside, &flaw](const Receive& receive) {
+      [&surface, &flaw](const Receive& receive) {
         surface.vertices_mm = taken<Eigen::Vector3f>(receive);
         surface.triangles = taken<std::array<std::uint32_t, 3>>(receive);
-        const auto name = taken<char>(receive);
-        beside.assign(name.begin(), name.end());
         const auto words = taken<char>(receive);
         flaw.assign(words.begin(), words.end());
       },
@@ -176,11 +247,6 @@ Result<Surface> read_surface(const fs::path& path) {
     return Error{Errc::unsupported, fmt::format("{}: its decoder {}; export it again, with fewer triangles",
                                                 path.string(), ran.error().what)};
   }
-  if (ran && !beside.empty()) {
-    return Error{Errc::unsupported, fmt::format("{}: is not whole without another file, {}; export it as one file: "
-                                                "PLY, STL, OBJ or VTK polygons",
-                                                path.string(), beside.substr(0, 255))};
-  }
   if (ran && !flaw.empty()) return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), flaw.substr(0, 255))};
   const bool sound = ran && !surface.triangles.empty() &&
                      std::all_of(surface.vertices_mm.begin(), surface.vertices_mm.end(),
@@ -190,9 +256,8 @@ Result<Surface> read_surface(const fs::path& path) {
                      });
   if (!sound) {
     const std::string how = ran ? "" : fmt::format(" (its decoder {})", ran.error().what);
-    return Error{Errc::bad_format, fmt::format("{}: holds no triangles that can be read{}; export it as PLY, STL, OBJ "
-                                               "or VTK polygons",
-                                               path.string(), how)};
+    return Error{Errc::bad_format,
+                 fmt::format("{}: holds no triangles that can be read{}; {}", path.string(), how, kForms)};
   }
   const auto is_far = [](const Eigen::Vector3f& p) { return p.cwiseAbs().maxCoeff() > kFarthestMm; };
   if (const auto far = std::ranges::find_if(surface.vertices_mm, is_far); far != surface.vertices_mm.end()) {

@@ -1,9 +1,15 @@
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmjpeg/djencode.h>
+#include <dcmtk/dcmjpls/djencode.h>
 #include <gtest/gtest.h>
 
 #include <cstdint>
 #include <fstream>
 #include <functional>
 #include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "host/volume/import.hpp"
 #include "tests/support/dicom_files.hpp"
@@ -93,6 +99,69 @@ TEST(DicomDoubts, AnElementThatStandsTwiceIsRefusedByItsTag) {
     ASSERT_FALSE(twice) << given;
     EXPECT_NE(twice.error().what.find("2.dcm: has (0020,0032) twice; export it again"), std::string::npos)
         << twice.error().what;
+  }
+}
+
+/// Writes a number of two bytes of group 0028 over the one that an explicit, little-endian file has, whose pixels stay.
+void say(const fs::path& path, std::uint16_t element, int number) {
+  std::string bytes = testing::contents_of(path);
+  const std::string head{'\x28', '\0', static_cast<char>(element & 0xFFU), static_cast<char>(element >> 8U), 'U', 'S',
+                         '\2',   '\0'};
+  const std::size_t at = bytes.find(head);
+  ASSERT_NE(at, std::string::npos) << element;
+  bytes[at + head.size()] = static_cast<char>(number);
+  bytes[at + head.size() + 1] = '\0';
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+constexpr std::uint16_t kRows = 0x0010, kColumns = 0x0011, kBitsAllocated = 0x0100;
+
+void expect_wrong_size(const fs::path& folder, const std::string& why) {
+  const auto ct = import_volume(folder);
+  ASSERT_FALSE(ct) << folder;
+  EXPECT_NE(ct.error().what.find(".dcm: " + why), std::string::npos) << ct.error().what;
+  EXPECT_NE(ct.error().what.find("export it again"), std::string::npos) << ct.error().what;
+}
+
+TEST(DicomDoubts, MorePixelsThanTheHeaderSaysAreRefusedAndPaddingIsNot) {
+  const Scratch scratch;
+  for (const auto& [element, number, due] :
+       {std::tuple{kColumns, 3, 18}, std::tuple{kRows, 2, 16}, std::tuple{kBitsAllocated, 8, 12}}) {
+    const fs::path folder = scratch / std::to_string(element);
+    write_four(folder, [](DcmDataset&, int) {});
+    for (int i = 1; i <= 4; ++i) say(folder / fmt::format("{}.dcm", i), element, number);
+    expect_wrong_size(folder, fmt::format("has 24 bytes of pixels where its Rows, Columns, Bits Allocated and Number "
+                                          "of Frames say {}",
+                                          due));
+  }
+  write_four(scratch / "padded", [](DcmDataset& dataset, int) {
+    const std::vector<Uint16> pixels(testing::kSliceColumns * testing::kSliceRows + 1, 1040);
+    ASSERT_TRUE(dataset.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size()).good());
+  });
+  const auto padded = import_volume(scratch / "padded");
+  ASSERT_TRUE(padded) << padded.error().what;
+  EXPECT_EQ(padded->at(3, 2, 3), 40);
+}
+
+TEST(DicomDoubts, ACompressedPictureOfAnotherSizeThanTheHeaderSaysIsRefused) {
+  DJEncoderRegistration::registerCodecs();
+  DJLSEncoderRegistration::registerCodecs();
+  for (const auto& [syntax, name] : {std::pair{EXS_RLELossless, "rle"}, std::pair{EXS_JPEGProcess14SV1, "jpeg"},
+                                     std::pair{EXS_JPEGLSLossless, "jpeg-ls"}}) {
+    const Scratch scratch;
+    write_ct_series(scratch / "ct", {}, 3, {}, syntax);
+    const auto right = import_volume(scratch / "ct");
+    ASSERT_TRUE(right) << name << ": " << right.error().what;
+    EXPECT_EQ(right->at(3, 2, 2), 200 + 11) << name;
+    const std::string held = syntax == EXS_RLELossless ? "12 pixels" : "4 x 3";
+    for (const auto& [element, number, said] : {std::tuple{kRows, 6, "4 x 6"}, std::tuple{kRows, 2, "4 x 2"},
+                                                std::tuple{kColumns, 3, "3 x 3"}, std::tuple{kColumns, 5, "5 x 3"}}) {
+      const fs::path folder = scratch / said;
+      fs::copy(scratch / "ct", folder);
+      for (int i = 1; i <= 3; ++i) say(folder / fmt::format("{}.dcm", i), element, number);
+      expect_wrong_size(folder,
+                        fmt::format("its compressed picture is of {} where its Columns and Rows say {}; ", held, said));
+    }
   }
 }
 

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <random>
+#include <tuple>
 
 #include "host/dicom/phase_words.hpp"
 #include "host/volume/import.hpp"
@@ -121,6 +122,30 @@ TEST(DicomExport, ACopyOfAWholeSeriesInAnotherFolderIsTheSameSeries) {
   write_ct_series(scratch / "cd/DICOM", {}, 4);
   fs::copy(scratch / "cd/DICOM", scratch / "cd/DICOM (copy)");
   expect_ct(scratch / "cd", 4, 0);
+}
+
+TEST(DicomExport, ACopyThatIsStoredOtherwiseIsACopy) {
+  const Scratch scratch;
+  write_ct_series(scratch / "cd/ct", {}, 4);
+  write_ct_series(
+      scratch / "cd/packed", {}, 4, [](DcmDataset& d) { put(d, DCM_SeriesDescription, "packed"); }, EXS_RLELossless);
+  expect_ct(scratch / "cd", 4, 0);
+}
+
+/// One that took the place of a slice would show another anatomy there.
+TEST(DicomExport, AnotherSliceOfTheSameNameInAnotherFolderIsNoCopy) {
+  const Scratch scratch;
+  for (const auto& [name, first, z_mm] : {std::tuple{"pixels", 1500, 2.0}, std::tuple{"place", 1100, 8.0}}) {
+    const fs::path folder = scratch / name;
+    write_ct_series(folder / "ct", {}, 4);
+    write_ct_slice(folder / "other/2.dcm", {"2.25.1", 1, 2, first, {0, 0, z_mm}, "abdomen"});
+    const auto ct = import_volume(folder);
+    ASSERT_FALSE(ct) << name;
+    for (const std::string& words :
+         {(folder / "ct/2.dcm").string(), (folder / "other/2.dcm").string(),
+          std::string("has the SOP Instance UID (0008,0018) of "), std::string("remove the one that does not belong")})
+      EXPECT_NE(ct.error().what.find(words), std::string::npos) << ct.error().what;
+  }
 }
 
 TEST(DicomExport, ACopyOfASliceInItsFolderIsTakenOnceAndSaid) {

@@ -251,6 +251,35 @@ TEST(CameraFiles, AWholeNumberThatOpenCvTakesForAnotherIsRefused) {
   EXPECT_EQ(*read_lens_text(camera_text(kLens) + "serial: \"41234567890123\"\nmade: 1700000000\n"), kLens);
 }
 
+/// Its four numbers k1 k2 k3 k4 would be taken for k1 k2 p1 p2.
+TEST(CameraFiles, AnotherModelOfOpenCvIsRefusedByName) {
+  const std::string plain = "%YAML:1.0\n---\n";
+  for (const auto& [line, words] :
+       {std::pair{"fisheye_model: 1\n", "lens.yaml: its fisheye_model 1 cannot be said by a lens here; calibrate with"},
+        {"xi: 1.2\n", "its xi (of an omnidirectional camera) 1.2 cannot be said"},
+        {"xi: !!opencv-matrix\n   rows: 1\n   cols: 1\n   dt: d\n   data: [ 1.2 ]\n", "its xi (of an"},
+        {"distortion_model: equidistant\n", "its distortion_model equidistant cannot be said"},
+        {"camera_model: fisheye\n", "its camera_model fisheye cannot be said"},
+        {"camera_model: 4\n", "its camera_model 4 cannot be said"}}) {
+    const auto camera = read_lens_text(changed(camera_text(kLens), plain, plain + line));
+    ASSERT_FALSE(camera) << line;
+    EXPECT_THAT(camera.error().what, HasSubstr(words));
+  }
+  for (const auto& [line, words] : {std::pair{"fisheye_model: 1\r\n", "its fisheye_model 1 cannot be said"},
+                                    {"xi: 1.2\r\n", "1.2 cannot be said"},
+                                    {"camera_model: fisheye\r\n", "its camera_model fisheye cannot be said"}}) {
+    const auto camera = read_lens_text(kRos + line);
+    ASSERT_FALSE(camera) << line;
+    EXPECT_THAT(camera.error().what, HasSubstr(words));
+  }
+  for (const char* line : {"fisheye_model: 0\n", "distortion_model: plumb_bob\n", "distortion_model: radtan\n",
+                           "distortion_model: rational_polynomial\n", "camera_model: Pinhole\n"}) {
+    const auto camera = read_lens_text(changed(camera_text(kLens), plain, plain + line));
+    ASSERT_TRUE(camera) << line << camera.error().what;
+    EXPECT_EQ(*camera, kLens) << line;
+  }
+}
+
 TEST(CameraFiles, WhatCannotBeSaidIsRefusedByName) {
   for (const auto& [text, words] :
        {std::pair{changed(kChain, "radtan", "equidistant"), "its distortion_model equidistant cannot be said"},

@@ -1,5 +1,6 @@
 #include "host/files/text_rows.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -109,6 +110,27 @@ TEST(TextRows, NamesAFileThatCannotBeReadToItsEnd) {
   const auto header = read_sequence_header("/proc/self/mem");
   ASSERT_FALSE(header);
   EXPECT_EQ(header.error().what.find(words), 0U) << header.error().what;
+}
+
+TEST(SequenceHeader, IsReadUpToItsBoundsAndRefusedBeyond) {
+  const Scratch scratch;
+  std::string text = "ObjectType = Image\n";
+  for (int i = 0; i < 4; ++i) text += fmt::format("Seq_Frame{:04}_Timestamp = {}\nSeq_Frame{:04}_X = 1\n", i, i, i);
+  text += "ElementDataFile = LOCAL\n";
+  const std::string path = scratch.file("long.igs.mha", text);
+  const auto all = read_sequence_header(path);
+  ASSERT_TRUE(all) << all.error().what;
+  EXPECT_EQ(all->frames.size(), 4U);
+  EXPECT_TRUE(all->whole);
+  EXPECT_TRUE(read_sequence_header(path, {10, text.size()}));
+  for (const HeaderBounds& most : {HeaderBounds{9, text.size()}, HeaderBounds{10, text.size() - 1}}) {
+    const auto header = read_sequence_header(path, most);
+    ASSERT_FALSE(header);
+    EXPECT_EQ(header.error().what.find(path + ": its header has more than the "), 0U) << header.error().what;
+    EXPECT_NE(header.error().what.find("divide the recording into shorter ones"), std::string::npos);
+  }
+  // What is read of a recording of an hour, 100 frames a second with 20 fields each.
+  EXPECT_GE(HeaderBounds().fields, 3600U * 100 * 20);
 }
 
 TEST(TextRows, RefusesUtf16AndWhatIsNotThere) {

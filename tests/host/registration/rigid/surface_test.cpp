@@ -232,54 +232,6 @@ TEST(SurfaceFile, EveryFormatGivesTheSameTriangles) {
   }
 }
 
-TEST(SurfaceFile, TakesNothingFromOtherFilesAndNamesOneThatItWouldNeed) {
-  const birdseye::testing::Scratch scratch;
-  (void)scratch.file("skin.mtl", "newmtl skin\nKd 1 0 0\n");
-  const auto coloured = read_surface(scratch.file(
-      "coloured.obj", "mtllib skin.mtl\nv 0 0 0\nv 10 0 0\nv 10 20 0\nv 0 20 5\nusemtl skin\nf 1 2 3\nf 1 3 4\n"));
-  ASSERT_TRUE(coloured) << coloured.error().what;
-  EXPECT_EQ(coloured->triangles.size(), 2U) << "a material is no part of a surface";
-  const float xyz[9] = {0, 0, 0, 10, 0, 0, 10, 20, 0};
-  (void)scratch.file("corners.bin", std::string(reinterpret_cast<const char*>(xyz), sizeof xyz));
-  const std::string path = scratch.file(
-      "scene.gltf",
-      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
-      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],)"
-      R"("buffers":[{"uri":"corners.bin","byteLength":36}],)"
-      R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36}],)"
-      R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[10,20,0]}]})");
-  const auto scene = read_surface(path);
-  ASSERT_FALSE(scene);
-  EXPECT_NE(scene.error().what.find("is not whole without another file, corners.bin; export it as one file"),
-            std::string::npos)
-      << scene.error().what;
-}
-
-TEST(SurfaceFile, RefusesWhatIsNoSurfaceInOneLine) {
-  const birdseye::testing::Scratch scratch;
-  const auto expect = [](const std::string& path, const char* words) {
-    const auto surface = read_surface(path);
-    ASSERT_FALSE(surface) << path;
-    EXPECT_EQ(surface.error().what.find(path), 0U);
-    EXPECT_NE(surface.error().what.find(words), std::string::npos) << surface.error().what;
-  };
-  expect((scratch / "none.ply").string(), "no such file");
-  expect(scratch.path().string(), "no such file");
-  expect(scratch.file("text.ply", "what"), "no triangles");
-  expect(scratch.file("text.vtk", "what"), "no triangles");
-  expect(scratch.file("cut.ply", "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\n"), "end_header");
-  expect(scratch.file("index.vtk",
-                      "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 10 0 0 "
-                      "10 20 0\nPOLYGONS 1 4\n3 0 1 9\n"),
-         "no triangles");
-  expect(scratch.file("cut.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 300000000 float\n0 0"),
-         "is cut short");
-  expect(scratch.file("huge.vtk",
-                      "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 10 0 0 "
-                      "10 20 0\nPOLYGONS 1 900000000\n900000000 0 1 2\n"),
-         "is cut short");
-}
-
 /// A wall of two triangles, 10 x 20 mm, in each form that is read; last: the z of its last corner.
 std::map<std::string, std::string> walls(const std::string& last = "5") {
   const std::string head =
@@ -317,6 +269,107 @@ std::map<std::string, std::string> walls(const std::string& last = "5") {
                         "\nPOLYGONS 2 8\n3 0 1 2\n3 0 2 3\n"},
       {"binary.vtk", vtk + "BINARY\nDATASET POLYDATA\nPOINTS 4 float\n" + bytes(xyz, true) + "\nPOLYGONS 2 8\n" +
                          bytes(first, true) + bytes(second, true)}};
+}
+
+TEST(SurfaceFile, TakesNothingFromOtherFiles) {
+  const birdseye::testing::Scratch scratch;
+  (void)scratch.file("skin.mtl", "newmtl skin\nKd 1 0 0\n");
+  const auto coloured = read_surface(scratch.file(
+      "coloured.obj", "mtllib skin.mtl\nv 0 0 0\nv 10 0 0\nv 10 20 0\nv 0 20 5\nusemtl skin\nf 1 2 3\nf 1 3 4\n"));
+  ASSERT_TRUE(coloured) << coloured.error().what;
+  EXPECT_EQ(coloured->triangles.size(), 2U) << "a material is no part of a surface";
+}
+
+/// Assimp reads some fifty forms, and leaves it to its caller to move, turn and scale what they hold.
+TEST(SurfaceFile, TakesNoOtherFormWhateverItsName) {
+  const birdseye::testing::Scratch scratch;
+  const std::string off = "OFF\n4 2 0\n0 0 0\n10 0 0\n10 20 0\n0 20 5\n3 0 1 2\n3 0 2 3\n";
+  const std::string amf =
+      "<?xml version=\"1.0\"?>\n<amf unit=\"inch\"><object id=\"0\"><mesh><vertices>"
+      "<vertex><coordinates><x>0</x><y>0</y><z>0</z></coordinates></vertex>"
+      "<vertex><coordinates><x>9</x><y>0</y><z>0</z></coordinates></vertex>"
+      "<vertex><coordinates><x>0</x><y>9</y><z>0</z></coordinates></vertex></vertices><volume>"
+      "<triangle><v1>0</v1><v2>1</v2><v3>2</v3></triangle></volume></mesh></object></amf>\n";
+  for (const auto& [name, text] : {std::pair{"wall.off", off}, {"wall.amf", amf}, {"wall", walls()["ascii.ply"]}}) {
+    const std::string path = scratch.file(name, text);
+    const auto surface = read_surface(path);
+    ASSERT_FALSE(surface) << name;
+    EXPECT_EQ(surface.error().what,
+              path + ": is no STL, PLY, OBJ or VTK by its name; export it as PLY, STL, OBJ or VTK polygons");
+  }
+  for (const std::string extension : {"stl", "ply", "vtk"}) {
+    for (const std::string& text : {off, amf, walls()["lines.obj"]}) {
+      const std::string path = scratch.file("named." + extension, text);
+      const auto surface = read_surface(path);
+      ASSERT_FALSE(surface) << extension << " of " << text;
+      EXPECT_EQ(surface.error().what.find(path + ": is named ." + extension + " and does not begin as one does"), 0U)
+          << surface.error().what;
+    }
+  }
+  for (const std::string& text : {off, amf, walls()["ascii.vtk"]})
+    EXPECT_FALSE(read_surface(scratch.file("named.obj", text))) << text;
+  const auto upper = read_surface(scratch.file("WALL.VTK", walls()["ascii.vtk"]));
+  ASSERT_TRUE(upper) << upper.error().what;
+  EXPECT_EQ(upper->triangles.size(), 2U);
+}
+
+TEST(SurfaceFile, OneThatSaysItIsInRasIsRefusedWithTheRemedy) {
+  const birdseye::testing::Scratch scratch;
+  const auto forms = [](const std::string& remark) {
+    auto said = walls();
+    const auto put = [&said](const char* name, const std::string& at, const std::string& what, std::size_t length) {
+      std::string& text = said[name];
+      text.replace(text.find(at), length, what);
+    };
+    put("binary.stl", std::string(60, 'x'), "3D Slicer output. " + remark + ' ', 19 + remark.size());
+    put("ascii.stl", "solid wall", "solid 3D Slicer output. " + remark, 10);
+    for (const char* name : {"ascii.ply", "little.ply", "big.ply"})
+      put(name, "element", "comment " + remark + "\nelement", 7);
+    put("lines.obj", "v", "# 3D Slicer output. " + remark + "\nv", 1);
+    for (const char* name : {"ascii.vtk", "binary.vtk"}) put(name, "\nx\n", "\n3D Slicer output. " + remark + "\n", 3);
+    return said;
+  };
+  for (const auto& [name, text] : forms("SPACE=RAS")) {
+    const std::string path = scratch.file(name, text);
+    const auto surface = read_surface(path);
+    ASSERT_FALSE(surface) << name;
+    EXPECT_EQ(surface.error().what.find(path + ": says SPACE=RAS, and a surface is read in LPS; save it again in LPS"),
+              0U)
+        << surface.error().what;
+  }
+  for (const char* remark : {"SPACE=LPS", "COLOR_SPACE=sRGB"}) {
+    for (const auto& [name, text] : forms(remark)) {
+      const auto surface = read_surface(scratch.file(name, text));
+      ASSERT_TRUE(surface) << name << " " << remark << " " << surface.error().what;
+      EXPECT_EQ(surface->triangles.size(), 2U) << name;
+    }
+  }
+}
+
+TEST(SurfaceFile, RefusesWhatIsNoSurfaceInOneLine) {
+  const birdseye::testing::Scratch scratch;
+  const auto expect = [](const std::string& path, const char* words) {
+    const auto surface = read_surface(path);
+    ASSERT_FALSE(surface) << path;
+    EXPECT_EQ(surface.error().what.find(path), 0U);
+    EXPECT_NE(surface.error().what.find(words), std::string::npos) << surface.error().what;
+  };
+  expect((scratch / "none.ply").string(), "no such file");
+  expect(scratch.path().string(), "no such file");
+  expect(scratch.file("text.ply", "what"), "is named .ply and does not begin as one does");
+  expect(scratch.file("text.vtk", "what"), "is named .vtk and does not begin as one does");
+  expect(scratch.file("text.obj", "what\n"), "no triangles");
+  expect(scratch.file("cut.ply", "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\n"), "end_header");
+  expect(scratch.file("index.vtk",
+                      "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 10 0 0 "
+                      "10 20 0\nPOLYGONS 1 4\n3 0 1 9\n"),
+         "no triangles");
+  expect(scratch.file("cut.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 300000000 float\n0 0"),
+         "is cut short");
+  expect(scratch.file("huge.vtk",
+                      "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 10 0 0 "
+                      "10 20 0\nPOLYGONS 1 900000000\n900000000 0 1 2\n"),
+         "is cut short");
 }
 
 TEST(SurfaceFile, OneThatIsCutShortIsNotTakenForASmallerOne) {
