@@ -1,7 +1,7 @@
 # bash completion for birdseye, birdseyed and birdseye-sim: what the program's own --help tells of the command so far.
 _birdseye() {
   local typed=${COMP_WORDS[COMP_CWORD]} word help offered=''
-  local -a command=("$1")
+  local -a command=("${1##*/}")  # of the PATH: Tab starts no program of whatever folder one is in
   for word in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do
     [[ $word =~ ^[a-z0-9][a-z0-9-]*$ ]] || break
     command+=("$word")

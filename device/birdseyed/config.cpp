@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -107,6 +108,8 @@ void read_tracker(ConfigSection& section, Config& config) {
   section.integer("usb_latency_ms", config.tracker.line.usb_latency_ms, 1, 255);
   if (const std::string fault = fault_of_socket(config.tracker.line.device, "unix:"); !fault.empty())
     section.fail("device", fault);
+  if (section.has("device") && config.tracker.line.device.empty())
+    section.fail("device", "is empty; give the tracker's line, as /dev/ttyUSB0");
   if (!config.tracker.line.device.empty()) {
     if (const auto sound = drivers::check_line(config.tracker.line); !sound)
       section.fail(drivers::is_serial_speed(unit.baud) ? "device" : "baud", sound.error().what);
@@ -178,6 +181,13 @@ void read_gpio(ConfigSection& section, Config& config) {
   section.text("pedal", lines.pedal);
   section.text("led", lines.led);
   section.text("trigger", lines.trigger);
+  std::map<std::string, const char*> users;
+  for (const auto& [key, line] : {std::pair("strobe", lines.strobe), std::pair("pedal", lines.pedal),
+                                  std::pair("led", lines.led), std::pair("trigger", lines.trigger)}) {
+    if (line.empty()) continue;
+    const auto [first, is_new] = users.try_emplace(line, key);
+    if (!is_new) section.fail(key, fmt::format("\"{}\" is the line of {} too; give another", line, first->second));
+  }
   read_bias(section, "strobe_bias", lines.strobe_bias);
   read_bias(section, "pedal_bias", lines.pedal_bias);
   section.milliseconds("pedal_debounce_ms", lines.pedal_debounce, 1000);

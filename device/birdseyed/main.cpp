@@ -64,11 +64,32 @@ void reload(const fs::path& path, device::Config& config, wire::Server& server,
   device::notify_ready(appliance ? appliance->summary() : "cannot go on");
 }
 
+/// Says whether a start would take the configuration, and what it would do without.
+int check_start(const fs::path& path) {
+  const auto config = device::read_config(path);
+  if (!config) return refuse(config.error());
+  if (const auto wire = device::check_wire(config->wire); !wire) return refuse(wire.error());
+  const std::string& record_refused =
+      config->core.calibration_refused.empty() ? config->calibration_unbound : config->core.calibration_refused;
+  for (const std::string& refused : {record_refused, config->core.field_refused}) {
+    if (!refused.empty()) print_error("birdseyed", refused);
+  }
+  if (const std::string& who = config->core.field_unsigned; !who.empty())
+    print_error("birdseyed", fmt::format("UNSIGNED: the map of the field is {}", who));
+  const char* without = !config->core.field_refused.empty() ? ", but no pose will be published"
+                        : !record_refused.empty()           ? ", but the record will not be used"
+                                                            : "";
+  print_line(fmt::format("{}: sound{}", path.string(), without));
+  if (const std::string who = device::admission_words(config->wire); !who.empty()) print_line(who);
+  return 0;
+}
+
 int serve(const fs::path& path, ServiceSignals& signals, device::SafeMode& safe_mode) {
   auto config = device::read_config(path);
   if (!config) return refuse(config.error());
   auto admission = device::admission_of(config->wire);
   if (!admission) return refuse(admission.error());
+  device::KnownKeysWatch known(admission->tls);
   auto server = wire::Server::listen(config->wire.bind, config->wire.port, *std::move(admission));
   if (!server) return refuse(server.error());
   auto started = device::Appliance::start(*config, **server, safe_mode.left_out());
@@ -84,7 +105,8 @@ int serve(const fs::path& path, ServiceSignals& signals, device::SafeMode& safe_
     const std::string hanging = appliance->hanging();
     safe_mode.note_hang(hanging);
     if (hanging.empty()) device::notify_alive();
-    device::notify_status(appliance->summary());
+    const std::string& fault = known.look();
+    device::notify_status(appliance->summary() + (fault.empty() ? "" : "; " + fault));
   }
   device::notify_stopping();
   spdlog::info("ending");
@@ -150,7 +172,7 @@ int main(int argc, char** argv) {
   bool check_only = false, probe_only = false, end_with_stdin = false, accept_unsigned = false;
   app.add_option("--config", config_path, "configuration file (TOML)")->required();
   CLI::Option* const check =
-      app.add_flag("--check", check_only, "read the configuration, say whether it is sound, and end");
+      app.add_flag("--check", check_only, "say whether a start would take the configuration, and end");
   CLI::Option* const probe =
       app.add_flag("--probe", probe_only, "open each instrument once, say what it is or what is wrong, and end")
           ->excludes(check);
@@ -172,23 +194,7 @@ int main(int argc, char** argv) {
   pairing->add_option("--name", pair_options.name, "by which to know the host (default: as it calls itself)");
   return run_program<CLI::ParseError>(app, argc, argv, [&] {
     if (*pairing) return pair(config_path, pair_options);
-    if (check_only) {
-      const auto config = device::read_config(config_path);
-      if (!config) return refuse(config.error());
-      const std::string& record_refused =
-          config->core.calibration_refused.empty() ? config->calibration_unbound : config->core.calibration_refused;
-      for (const std::string& refused : {record_refused, config->core.field_refused}) {
-        if (!refused.empty()) print_error("birdseyed", refused);
-      }
-      if (const std::string& who = config->core.field_unsigned; !who.empty())
-        print_error("birdseyed", fmt::format("UNSIGNED: the map of the field is {}", who));
-      const char* without = !config->core.field_refused.empty() ? ", but no pose will be published"
-                            : !record_refused.empty()           ? ", but the record will not be used"
-                                                                : "";
-      print_line(fmt::format("{}: sound{}", config_path.string(), without));
-      if (const std::string who = device::admission_words(config->wire); !who.empty()) print_line(who);
-      return 0;
-    }
+    if (check_only) return check_start(config_path);
     spdlog::set_default_logger(
         std::make_shared<spdlog::logger>("birdseyed", std::make_shared<device::PatientStderr>()));
     ServiceSignals signals;

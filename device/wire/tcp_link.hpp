@@ -5,6 +5,7 @@
 #include <string>
 
 #include "device/wire/link.hpp"
+#include "device/wire/refusal_log.hpp"
 #include "device/wire/tls.hpp"
 #include "drivers/system/unique_fd.hpp"
 
@@ -33,10 +34,13 @@ struct Admission {
   bool allow_plain = false;
   std::function<bool(const std::string&)> is_local = is_loopback;  ///< by the address
   Duration patience = Duration::from_ms(5000);                     ///< with a handshake
+  RefusalLog::Tell tell_refused = {};  ///< is told who was not let in and why, from the thread of Listener::wait()
 };
 
 /// port 0 takes any that is free. A port in use is an error that names it and the setting. Handshakes have a bound in
 /// time, number and rate, each machine by itself: whoever begins one and does not go on takes nothing from the others.
 Result<std::unique_ptr<Listener>> listen_tcp(const std::string& bind_address, int port, Admission admission = {});
+/// Whether listen_tcp() could listen on the address: asks the kernel with a port that is free, and leaves it.
+Result<void> check_bind(const std::string& bind_address);
 
 }  // namespace birdseye::wire

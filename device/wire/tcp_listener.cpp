@@ -66,21 +66,25 @@ class Gate {
   /// Whether it stays.
   bool go_on(Arrival& arrival, short told);
   bool begin_tls(Arrival& arrival);
+  void refuse(const std::string& host, const std::string& why) { refusals_.note(host, why, device_now()); }
   void let_in(std::unique_ptr<Link> link) { let_in_.push_back(std::move(link)); }
 
   Admission admission_;
+  RefusalLog refusals_{admission_.tell_refused};
   std::list<Arrival> arrivals_;
   std::deque<std::unique_ptr<Link>> let_in_;
   HandshakeLimits handshakes_{kPerHandshake, kHandshakesAtOnce, kMostHostsRemembered};
 };
 
 void Gate::take(UniqueFd fd, std::string host) {
-  if (!admission_.tls && !admission_.allow_plain) return;
+  if (!admission_.tls && !admission_.allow_plain) return refuse(host, "programs of this machine alone are let in");
   if (!admission_.tls) return let_in(link_over(std::move(fd), false));
   const auto of_host = [&](const Arrival& other) { return other.host == host; };
-  if (std::ranges::count_if(arrivals_, of_host) >= std::ptrdiff_t{kMostArrivalsOfAHost}) return;
+  if (std::ranges::count_if(arrivals_, of_host) >= std::ptrdiff_t{kMostArrivalsOfAHost})
+    return refuse(host, fmt::format("it has {} handshakes that are not done", kMostArrivalsOfAHost));
   if (arrivals_.size() + let_in_.size() >= kMostArrivals) {
-    if (arrivals_.empty()) return;
+    if (arrivals_.empty()) return refuse(host, "too many have just been let in");
+    refuse(arrivals_.front().host, "its handshake was not done when others needed the place");
     arrivals_.pop_front();  // which has had the most time
   }
   const Duration patience = admission_.allow_plain ? kFirstByte : admission_.patience;
@@ -89,9 +93,15 @@ void Gate::take(UniqueFd fd, std::string host) {
 }
 
 bool Gate::begin_tls(Arrival& arrival) {
-  if (!handshakes_.pass(arrival.host, device_now())) return false;
+  if (!handshakes_.pass(arrival.host, device_now())) {
+    refuse(arrival.host, "it begins handshakes too often");
+    return false;
+  }
   auto link = TlsLink::over(std::move(arrival.fd), admission_.tls, TlsLink::Side::server);
-  if (!link) return false;
+  if (!link) {
+    refuse(arrival.host, link.error().what);
+    return false;
+  }
   arrival.tls = *std::move(link);
   arrival.due = device_now() + admission_.patience;
   return true;
@@ -114,20 +124,28 @@ void Gate::go_on(std::span<const pollfd> entries) {
     const bool waits = arrival->tls && entry->revents != 0 && ++steps > kMostStepsAtOnce;
     arrival = go_on(*arrival, waits ? short{0} : entry->revents) ? std::next(arrival) : arrivals_.erase(arrival);
   }
+  refusals_.tell_due(device_now());
 }
 
 bool Gate::go_on(Arrival& arrival, short told) {
   const bool late = device_now() >= arrival.due;
   if (arrival.tls) {
-    if (told == 0) return !late;
-    arrival.tls->send_unsent();
-    const auto done = arrival.tls->shake();
-    if (done && *done) let_in(std::move(arrival.tls));
-    return done && !*done && !late;
+    if (told != 0) {
+      arrival.tls->send_unsent();
+      const auto done = arrival.tls->shake();
+      if (!done) refuse(arrival.host, done.error().what);
+      if (done && *done) let_in(std::move(arrival.tls));
+      if (!done || *done) return false;
+    }
+    if (late) refuse(arrival.host, "its handshake was not done in time");
+    return !late;
   }
   std::uint8_t first = 0;
   const ssize_t got = told == 0 ? -1 : ::recv(arrival.fd.get(), &first, 1, MSG_PEEK | MSG_DONTWAIT);
-  if (got == 0) return false;
+  if (got == 0) {
+    refuse(arrival.host, "it went without a word");
+    return false;
+  }
   if (got < 0 && !late) return true;
   if (got > 0 && first == kHandshakeRecord) return begin_tls(arrival);
   let_in(link_over(std::move(arrival.fd), false));
@@ -204,9 +222,21 @@ class TcpListener final : public Listener {
   std::vector<pollfd> entries_;
 };
 
-}  // namespace
+/// Why the last call of the kernel did not do what it should.
+Error cannot_listen(const std::string& bind_address, int port) {
+  if (errno == EADDRINUSE) {
+    return {Errc::in_use, fmt::format("[wire] port {} on {} is in use; stop the other program or choose another", port,
+                                      bind_address)};
+  }
+  if (errno == EADDRNOTAVAIL) {
+    return {Errc::bad_value, fmt::format("[wire] bind {}: this machine has no such address; give one of its own, or "
+                                         "0.0.0.0 for all that it has",
+                                         bind_address)};
+  }
+  return {Errc::bad_value, fmt::format("[wire] bind {} port {}: this machine cannot listen there", bind_address, port)};
+}
 
-Result<std::unique_ptr<Listener>> listen_tcp(const std::string& bind_address, int port, Admission admission) {
+Result<UniqueFd> bound_socket(const std::string& bind_address, int port) {
   if (const std::string fault = fault_of_bind(bind_address); !fault.empty())
     return Error{Errc::bad_value, "[wire] bind " + fault};
   sockaddr_in address{};
@@ -216,20 +246,29 @@ Result<std::unique_ptr<Listener>> listen_tcp(const std::string& bind_address, in
   UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const int on = 1;
   if (fd) ::setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+  if (!fd || ::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+    return cannot_listen(bind_address, port);
+  return fd;
+}
+
+}  // namespace
+
+Result<void> check_bind(const std::string& bind_address) {
+  if (const auto fd = bound_socket(bind_address, 0); !fd) return fd.error();
+  return {};
+}
+
+Result<std::unique_ptr<Listener>> listen_tcp(const std::string& bind_address, int port, Admission admission) {
+  auto fd = bound_socket(bind_address, port);
+  if (!fd) return fd.error();
+  sockaddr_in address{};
   socklen_t size = sizeof address;
-  if (!fd || ::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0 ||
-      ::listen(fd.get(), kMostCalling) != 0 ||
-      ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0) {
-    if (errno == EADDRINUSE) {
-      return Error{Errc::in_use, fmt::format("[wire] port {} on {} is in use; stop the other program or choose another",
-                                             port, bind_address)};
-    }
-    return Error{Errc::bad_value,
-                 fmt::format("[wire] bind {} port {}: this machine cannot listen there", bind_address, port)};
-  }
+  if (::listen(fd->get(), kMostCalling) != 0 ||
+      ::getsockname(fd->get(), reinterpret_cast<sockaddr*>(&address), &size) != 0)
+    return cannot_listen(bind_address, port);
   UniqueFd wake_fd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   return std::unique_ptr<Listener>(
-      std::make_unique<TcpListener>(std::move(fd), std::move(wake_fd), ntohs(address.sin_port), std::move(admission)));
+      std::make_unique<TcpListener>(*std::move(fd), std::move(wake_fd), ntohs(address.sin_port), std::move(admission)));
 }
 
 }  // namespace birdseye::wire

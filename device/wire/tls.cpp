@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "device/wire/tls_link.hpp"
+#include "drivers/identity/followed_keys.hpp"
 #include "drivers/identity/identity_folder.hpp"
-#include "drivers/identity/known_keys.hpp"
 
 namespace birdseye::wire {
 
@@ -70,7 +70,7 @@ std::string pem_of(X509* certificate) {
   return {text, static_cast<std::size_t>(size)};
 }
 
-Result<std::shared_ptr<const Tls>> Tls::make(const MachineKey& key, Known known) {
+Result<std::shared_ptr<const Tls>> Tls::make(const MachineKey& key, Known known, Fault fault) {
   const std::shared_ptr<SSL_CTX> context(::SSL_CTX_new(::TLS_method()), ::SSL_CTX_free);
   const auto certificate = certificate_of(key);
   if (!context || !certificate) return failed("no certificate can be made of this machine's key");
@@ -92,7 +92,8 @@ Result<std::shared_ptr<const Tls>> Tls::make(const MachineKey& key, Known known)
   SSL_CTX_set_max_cert_list(c, kMostCertificateBytes);
   SSL_CTX_set_read_ahead(c, 1);
   ::SSL_CTX_set_default_read_buffer_len(c, kReadAheadBytes);
-  return std::shared_ptr<const Tls>(new Tls(context, key.public_key(), std::move(known), pem_of(certificate.get())));
+  return std::shared_ptr<const Tls>(
+      new Tls(context, key.public_key(), std::move(known), std::move(fault), pem_of(certificate.get())));
 }
 
 Result<std::shared_ptr<const Tls>> Tls::of_this_machine() {
@@ -100,12 +101,11 @@ Result<std::shared_ptr<const Tls>> Tls::of_this_machine() {
   if (!folder) return folder.error();
   const auto key = MachineKey::open(*folder);
   if (!key) return key.error();
-  const KnownKeys::Machine own{machine_name(), key->public_key()};
-  if (const auto known = KnownKeys::read(*folder, own); !known) return known.error();
-  return make(*key, [folder = *folder, own](const PublicKey& shown) -> std::optional<std::string> {
-    const auto known = KnownKeys::read(folder, own);
-    return known ? known->name_of(shown) : std::nullopt;
-  });
+  auto opened = FollowedKeys::open(*folder, {machine_name(), key->public_key()});
+  if (!opened) return opened.error();
+  const std::shared_ptr<FollowedKeys> known = *std::move(opened);
+  return make(
+      *key, [known](const PublicKey& shown) { return known->name_of(shown); }, [known] { return known->fault(); });
 }
 
 }  // namespace birdseye::wire

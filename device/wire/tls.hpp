@@ -25,27 +25,35 @@ class Tls {
   /// The name of the machine with this key; nothing: it is not let in. Asked for each connection.
   using Known = std::function<std::optional<std::string>(const PublicKey&)>;
 
-  static Result<std::shared_ptr<const Tls>> make(const MachineKey& key, Known known);
+  /// What is wrong with whom `Known` knows, in words; empty: nothing.
+  using Fault = std::function<std::string()>;
+
+  static Result<std::shared_ptr<const Tls>> make(const MachineKey& key, Known known, Fault fault = {});
   /// Of the key and the known keys in the identity's folder. The known keys are read again for each connection, so that
-  /// a machine may be paired, or its key taken out, while this program runs.
+  /// a machine may be paired, or its key taken out, while this program runs (FollowedKeys).
   static Result<std::shared_ptr<const Tls>> of_this_machine();
 
   [[nodiscard]] const PublicKey& own_key() const { return own_key_; }
   [[nodiscard]] SSL_CTX* context() const { return context_.get(); }
   [[nodiscard]] std::optional<std::string> name_of(const PublicKey& key) const { return known_(key); }
+  /// What is wrong with the file of the known keys, with the remedy: until then they are as they last were. Empty:
+  /// nothing.
+  [[nodiscard]] std::string fault() const { return fault_ ? fault_() : ""; }
   /// The certificate as PEM, the same to the byte each time: for programs that go by a file of it.
   [[nodiscard]] const std::string& certificate() const { return certificate_; }
 
  private:
-  Tls(std::shared_ptr<SSL_CTX> context, const PublicKey& own_key, Known known, std::string certificate)
+  Tls(std::shared_ptr<SSL_CTX> context, const PublicKey& own_key, Known known, Fault fault, std::string certificate)
       : context_(std::move(context)),
         own_key_(own_key),
         known_(std::move(known)),
+        fault_(std::move(fault)),
         certificate_(std::move(certificate)) {}
 
   std::shared_ptr<SSL_CTX> context_;
   PublicKey own_key_;
   Known known_;
+  Fault fault_;
   std::string certificate_;
 };
 

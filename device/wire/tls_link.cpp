@@ -165,6 +165,7 @@ Error TlsLink::failure() {
   if (refused_) return {Errc::bad_value, "its key is not known here"};
   if (too_many_keys_) return {Errc::bad_format, "the other side asks for new keys without end"};
   const int reason = ERR_GET_REASON(::ERR_peek_last_error());
+  if (reason == SSL_R_PEER_DID_NOT_RETURN_A_CERTIFICATE) return {Errc::bad_value, "it shows no key"};
   if (reason == SSL_R_SSLV3_ALERT_BAD_CERTIFICATE) return {Errc::bad_value, "it does not know this machine's key"};
   return {Errc::disconnected, "the other side has gone"};
 }

@@ -32,7 +32,8 @@ class TlsLink final : public SocketLink {
   TlsLink& operator=(const TlsLink&) = delete;
 
   /// Goes on with the handshake as far as it can without waiting. False: not done yet. Errc::bad_value: one
-  /// side does not know the other's key; Errc::unsupported: the other side does not speak TLS 1.3 as this one does.
+  /// side does not know the other's key, or is shown none; Errc::unsupported: the other side does not speak TLS 1.3 as
+  /// this one does.
   Result<bool> shake();
   /// Waits until shake() may get on.
   bool wait_shaken(Deadline deadline) { return wait_socket(deadline); }

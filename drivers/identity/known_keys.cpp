@@ -19,17 +19,18 @@ namespace birdseye {
 namespace fs = std::filesystem;
 
 bool KnownKeys::is_name(std::string_view name) {
-  return !name.empty() && name.size() <= 255 && name.front() != '#' && name != "own" && name != "." && name != ".." &&
-         std::none_of(name.begin(), name.end(),
-                      [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == 127 || c == '/'; });
+  return !name.empty() && name.size() <= kMostNameBytes && name.front() != '#' && name != "own" && name != "." &&
+         name != ".." && std::none_of(name.begin(), name.end(), [](char c) {
+           return static_cast<unsigned char>(c) <= ' ' || c == 127 || c == '/';
+         });
 }
 
 std::string KnownKeys::objection(const Machine& machine) const {
   if (!is_name(machine.name)) {
     return fmt::format(
-        "\"{}\" is no name of a machine: give one word without spaces, # before it or / in it, and not "
-        "\"own\", \".\" or \"..\"",
-        machine.name);
+        "\"{}\" is no name of a machine: give one word of at most {} bytes without spaces, # before it or / in it, and "
+        "not \"own\", \".\" or \"..\"",
+        machine.name, kMostNameBytes);
   }
   for (const Machine& known : machines_) {
     if (known.name == machine.name && known.key != machine.key)
@@ -42,7 +43,10 @@ std::string KnownKeys::objection(const Machine& machine) const {
 std::string KnownKeys::free_name(const std::string& name) const {
   std::string free = name;
   const auto has_it = [&free](const Machine& known) { return known.name == free; };
-  for (int number = 2; std::ranges::any_of(machines_, has_it); ++number) free = fmt::format("{}-{}", name, number);
+  for (int number = 2; std::ranges::any_of(machines_, has_it); ++number) {
+    const std::string behind = fmt::format("-{}", number);
+    free = name.substr(0, kMostNameBytes - behind.size()) + behind;
+  }
   return free;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -32,10 +33,13 @@ class KnownKeys {
   /// Also into the file, and onto the disk. A key that is known stays with its name. Refuses what is_name() does
   /// not take, and a name that another key has.
   Result<void> add(const std::string& name, const PublicKey& key);
-  /// Whether another machine may have it: it is one word, and the name of a file (pairing keeps NAME.crt) other than
+  /// A file's name has at most 255 bytes, and pairing keeps NAME.crt.
+  static constexpr std::size_t kMostNameBytes = 255 - 4;
+  /// Whether another machine may have it: it is one word of at most kMostNameBytes, and the name of a file other than
   /// this machine's own.
   [[nodiscard]] static bool is_name(std::string_view name);
-  /// The name, or where a machine has it already the first of NAME-2, NAME-3 that none has.
+  /// The name, or where a machine has it already the first of NAME-2, NAME-3 that none has, NAME cut where it is too
+  /// long for that.
   [[nodiscard]] std::string free_name(const std::string& name) const;
   /// Why add() would refuse the machine; empty where it would not.
   [[nodiscard]] std::string objection(const Machine& machine) const;

@@ -31,6 +31,7 @@ namespace fs = std::filesystem;
 
 using Bio = std::unique_ptr<BIO, decltype(&BIO_free)>;
 
+constexpr const char* kFile = "key.pem";
 constexpr std::size_t kMostBytes = 4096;  // of a key's file: one of Ed25519 has 119
 
 std::shared_ptr<EVP_PKEY> owned(EVP_PKEY* key) {
@@ -43,13 +44,14 @@ Error cannot(const fs::path& path, const char* what) {
                       path.string(), what, std::strerror(errno))};
 }
 
-/// The folder, made where there is none, and its owner's alone.
-Result<void> own_folder(const fs::path& folder) {
+/// Whatever it is: of a link, whether the link is there.
+bool is_there(const fs::path& path) {
   std::error_code ignored;
-  if (!fs::exists(folder, ignored)) {
-    if (auto made = make_folder_durably(folder); !made) return made;
-    if (::chmod(folder.c_str(), S_IRWXU) != 0) return cannot(folder, "cannot be made its owner's alone");
-  }
+  return fs::exists(fs::symlink_status(path, ignored));
+}
+
+/// That the folder is one, and its owner's alone.
+Result<void> check_folder(const fs::path& folder) {
   struct stat status {};
   if (::stat(folder.c_str(), &status) != 0) return cannot(folder, "cannot be read");
   if (!S_ISDIR(status.st_mode)) {
@@ -61,6 +63,25 @@ Result<void> own_folder(const fs::path& folder) {
   if ((status.st_mode & (S_IWGRP | S_IWOTH)) == 0) return {};
   return Error{Errc::bad_value, fmt::format("{}: others than its owner may change the keys in it: chmod 700 {}",
                                             folder.string(), folder.string())};
+}
+
+/// The same, and the folder is made where there is none.
+Result<void> own_folder(const fs::path& folder) {
+  std::error_code ignored;
+  if (!fs::exists(folder, ignored)) {
+    if (auto made = make_folder_durably(folder); !made) return made;
+    if (::chmod(folder.c_str(), S_IRWXU) != 0) return cannot(folder, "cannot be made its owner's alone");
+  }
+  return check_folder(folder);
+}
+
+/// That a file could be made, and the folders above it that are not there.
+Result<void> check_makeable(const fs::path& file) {
+  fs::path above = fs::absolute(file).parent_path();
+  std::error_code ignored;
+  while (!fs::exists(above, ignored) && above.has_relative_path()) above = above.parent_path();
+  if (::access(above.c_str(), W_OK | X_OK) == 0) return {};
+  return cannot(file, "cannot be made");
 }
 
 bool write_all(int fd, std::span<const char> bytes) {
@@ -145,15 +166,27 @@ Result<std::shared_ptr<EVP_PKEY>> read_key(const fs::path& file) {
 
 Result<MachineKey> MachineKey::open(const fs::path& folder) {
   if (auto own = own_folder(folder); !own) return own.error();
-  const fs::path file = folder / "key.pem";
-  std::error_code ignored;
-  if (!fs::exists(fs::symlink_status(file, ignored))) {
+  const fs::path file = folder / kFile;
+  if (!is_there(file)) {
     if (auto made = make_key(file); !made) return made.error();
   }
   auto key = read_key(file);
   if (!key) return key.error();
   const PublicKey public_key = public_half_of(key->get());
   return MachineKey(*std::move(key), public_key, file);
+}
+
+Result<std::optional<MachineKey>> MachineKey::look(const fs::path& folder) {
+  if (is_there(folder)) {
+    if (auto checked = check_folder(folder); !checked) return checked.error();
+  }
+  if (!is_there(folder / kFile)) {
+    if (auto checked = check_makeable(folder / kFile); !checked) return checked.error();
+    return std::optional<MachineKey>();
+  }
+  auto key = open(folder);
+  if (!key) return key.error();
+  return std::optional<MachineKey>(*std::move(key));
 }
 
 MachineKey MachineKey::for_once() {

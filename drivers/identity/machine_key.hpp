@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -20,6 +21,8 @@ class MachineKey {
   /// Of the folder, and made there where there is none: of two programs that make it at once both get the same. Refused
   /// where anybody else but root may read the key or change the folder, or one of them belongs to another.
   static Result<MachineKey> open(const std::filesystem::path& folder);
+  /// As open() would, but nothing is made: nothing where there is no key yet and open() could make one.
+  static Result<std::optional<MachineKey>> look(const std::filesystem::path& folder);
   /// One that is kept nowhere, and has no file.
   static MachineKey for_once();
 

@@ -59,6 +59,16 @@ completes() {
   _birdseye "$1"
   [ "${COMPREPLY[*]}" = "$wanted" ] || fail "completion of '$*': '${COMPREPLY[*]}', not '$wanted'"
 }
+# A program of the folder that one is in is not started by it.
+(
+  cd "$(mktemp -d)"
+  printf '#!/bin/sh\ntouch started\n' >birdseye
+  chmod +x birdseye
+  . "$all/usr/share/bash-completion/completions/birdseye"
+  COMP_WORDS=(./birdseye de) COMP_CWORD=1
+  _birdseye ./birdseye
+  [ ! -e started ] && [ "${COMPREPLY[*]}" = demo ]
+) || fail "the completion of ./birdseye started that program"
 completes "demo" birdseye de
 completes "hand-eye" birdseye calibrate h
 completes "--ct" birdseye demo --c

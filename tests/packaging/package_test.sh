@@ -57,6 +57,7 @@ control=$build/package/control
 rm -rf "$control"
 dpkg-deb -e "$deb" "$control"
 grep -qx /etc/birdseye/birdseyed.toml "$control/conffiles" || fail "an upgrade would overwrite the configuration"
+grep -q 'install -d -m 0700 -o birdseye -g birdseye /var/lib/birdseye' "$control/postinst" || fail "pairing before the first start finds no folder"
 for script in postinst prerm postrm; do
   [ -x "$control/$script" ] || fail "$script: cannot be run"
   sh -n "$control/$script" || fail "$script: is not sh"

@@ -2,14 +2,21 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+#include <stdlib.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
+#include <memory>
 #include <optional>
+#include <sstream>
 
 #include "device/birdseyed/wire_admission.hpp"
 #include "drivers/identity/this_machine.hpp"
+#include "drivers/system/wait.hpp"
 #include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -207,6 +214,131 @@ TEST(Config, PlainBeyondThisMachineIsAllowedOnlyWhereItIsAskedForAndIsSaid) {
   EXPECT_EQ(admission_words(here->wire), "");
 }
 
+/// A folder of keys that every program of this process takes for its machine's.
+class CheckedWire : public ::testing::Test {
+ protected:
+  void SetUp() override { ::setenv("BIRDSEYE_IDENTITY", folder_.c_str(), 1); }
+  void TearDown() override {
+    if (before_) {
+      ::setenv("BIRDSEYE_IDENTITY", before_->c_str(), 1);
+    } else {
+      ::unsetenv("BIRDSEYE_IDENTITY");
+    }
+  }
+  static std::string fault_of(const std::string& bind) {
+    WireConfig wire;
+    wire.bind = bind;
+    const auto checked = check_wire(wire);
+    return checked ? "" : checked.error().what;
+  }
+  void say(const std::string& known) const {
+    std::ofstream(folder_ / "known") << known;
+    std::filesystem::permissions(folder_ / "known", std::filesystem::perms::owner_read);
+  }
+
+  testing::Scratch scratch_;
+  std::filesystem::path folder_ = scratch_ / "identity";
+
+ private:
+  static std::optional<std::string> environment(const char* name) {
+    const char* const value = std::getenv(name);
+    return value == nullptr ? std::nullopt : std::optional<std::string>(value);
+  }
+  std::optional<std::string> before_ = environment("BIRDSEYE_IDENTITY");
+};
+
+TEST_F(CheckedWire, WithoutAKeyIsSoundAndNoneIsMade) {
+  EXPECT_EQ(fault_of("127.0.0.1"), "");
+  EXPECT_EQ(fault_of("0.0.0.0"), "");
+  EXPECT_FALSE(std::filesystem::exists(folder_));
+}
+
+TEST_F(CheckedWire, AnAddressThatIsNoneOfThisMachinesIsAFault) {
+  const std::string fault = fault_of("203.0.113.7");  // of a network for examples (RFC 5737)
+  EXPECT_EQ(fault.rfind("[wire] bind 203.0.113.7: this machine has no such address", 0), 0U) << fault;
+  EXPECT_EQ(std::count(fault.begin(), fault.end(), '\n'), 0) << fault;
+}
+
+TEST_F(CheckedWire, KeysThatAStartWouldRefuseAreAFaultBeyondThisMachineAlone) {
+  ASSERT_TRUE(MachineKey::open(folder_));
+  EXPECT_EQ(fault_of("0.0.0.0"), "");
+  std::filesystem::permissions(folder_ / "key.pem", std::filesystem::perms::others_read,
+                               std::filesystem::perm_options::add);
+  const std::string readable = fault_of("0.0.0.0");
+  EXPECT_NE(readable.find("key.pem: others than its owner may read"), std::string::npos) << readable;
+  WireConfig wire;
+  wire.bind = "0.0.0.0";
+  const auto admission = admission_of(wire);
+  ASSERT_FALSE(admission);
+  EXPECT_EQ(readable, admission.error().what) << "what a start says";
+  EXPECT_EQ(fault_of("127.0.0.1"), "");
+}
+
+TEST_F(CheckedWire, ALineOfTheKnownKeysThatCannotBeUsedIsAFault) {
+  ASSERT_TRUE(MachineKey::open(folder_));
+  say("theatre-3 KEY\n");
+  const std::string fault = fault_of("0.0.0.0");
+  EXPECT_NE(fault.find("known: line 1: is no machine's name and key"), std::string::npos) << fault;
+  const std::string both = fault_of("203.0.113.7");
+  EXPECT_NE(both.find("known: line 1"), std::string::npos) << both;
+  EXPECT_NE(both.find("\n[wire] bind 203.0.113.7: this machine has no such address"), std::string::npos) << both;
+}
+
+/// What the log says, for as long as this is there.
+class Logged {
+ public:
+  Logged() {
+    spdlog::set_default_logger(
+        std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text_)));
+  }
+  ~Logged() { spdlog::set_default_logger(before_); }
+  Logged(const Logged&) = delete;
+  Logged& operator=(const Logged&) = delete;
+  [[nodiscard]] std::ptrdiff_t lines() const {
+    const std::string text = text_.str();
+    return std::count(text.begin(), text.end(), '\n');
+  }
+  [[nodiscard]] bool has(const std::string& words) const { return text_.str().find(words) != std::string::npos; }
+
+ private:
+  std::ostringstream text_;
+  std::shared_ptr<spdlog::logger> before_ = spdlog::default_logger();
+};
+
+TEST_F(CheckedWire, AFaultOfTheKnownKeysIsLoggedOnceUntilItChanges) {
+  WireConfig wire;
+  wire.bind = "0.0.0.0";
+  const auto admission = admission_of(wire);
+  ASSERT_TRUE(admission) << admission.error().what;
+  KnownKeysWatch watch(admission->tls);
+  const Logged logged;
+  const auto wait_until_told = [&](bool is_fault) {
+    const Deadline soon = Deadline::after(Duration::from_ms(20'000));
+    while (watch.look().empty() == is_fault && !soon.passed()) sleep_for(Duration::from_ms(1));
+    for (int i = 0; i < 10; ++i) {  // it is read again, and nothing is told
+      sleep_for(Duration::from_ms(1));
+      (void)watch.look();
+    }
+  };
+  wait_until_told(false);
+  EXPECT_EQ(logged.lines(), 0);
+  say("theatre-3 KEY\n");
+  wait_until_told(true);
+  EXPECT_NE(watch.look().find("known: line 1: "), std::string::npos) << watch.look();
+  EXPECT_EQ(logged.lines(), 1);
+  EXPECT_TRUE(logged.has("mend or remove the line; until then the machines are let in that the file named before"));
+  std::filesystem::remove(folder_ / "known");
+  wait_until_told(false);
+  EXPECT_EQ(watch.look(), "");
+  EXPECT_EQ(logged.lines(), 2);
+}
+
+TEST(KnownKeysWatch, OfAWireOfThisMachineAloneSaysNothing) {
+  KnownKeysWatch watch(nullptr);
+  EXPECT_EQ(watch.look(), "");
+  EXPECT_EQ(watch.look(), "");
+}
+
 TEST(Config, TwoBirdsMayNotHaveTransformsOfOneName) {
   const std::string alike = "\"laparoscope_left\", \"laparoscope_right\"";
   const auto config = read(replaced("\"scope\", \"pointer\"", alike));
@@ -318,6 +450,9 @@ TEST(Config, EveryMistakeIsNamed) {
       {replaced("rate_hz = 100", "rate_hz = 500"), "[tracker] rate_hz: 500 is not within"},
       {replaced("port = 18945", "port = 99999"), "[wire] port"},
       {replaced("device = \"/dev/ttyUSB0\"", ""), "[tracker] device: is missing"},
+      {replaced("/dev/ttyUSB0", ""), "[tracker] device: is empty; give the tracker's line"},
+      {replaced("[wire]", "[gpio]\nchip = \"c\"\nstrobe = \"5\"\ntrigger = \"5\"\n[wire]"),
+       "[gpio] trigger: \"5\" is the line of strobe too; give another"},
       {replaced("birds = 2", "birds = 3"), "2 names for 3 birds"},
       {replaced("birds = 2", "birds = 2\nreference = \"table\""), "[tracker] reference: \"table\" is none of"},
       {replaced("birds = 2", "birds = 2\nreference = \"scope\""), "[tracker] reference: \"scope\" is none of"},

@@ -8,9 +8,12 @@
 #include <array>
 #include <list>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "device/wire/client.hpp"
 #include "device/wire/handshake_limits.hpp"
+#include "device/wire/refusal_log.hpp"
 #include "device/wire/server.hpp"
 #include "device/wire/tcp_link.hpp"
 #include "device/wire/tls_link.hpp"
@@ -113,6 +116,125 @@ TEST_F(AdmittedServer, OneMachinesHandshakesAreBoundedInNumberAndRateAndNoOthers
   EXPECT_GT(let_in, 0);
   EXPECT_LT(let_in, 3000);
   EXPECT_EQ(first_word(by_tls(kThere)), "ready");
+}
+
+/// Some that are not let in, and what is told of the first of them.
+class ToldServer : public AdmittedServer {
+ protected:
+  void listen_and_tell(Admission admission) {
+    admission.tell_refused = [this](const std::string& line) { told_.push_back(line); };
+    listen(std::move(admission));
+  }
+  /// Once the server, which tells, has ended.
+  const std::vector<std::string>& told() {
+    server_.reset();
+    return told_;
+  }
+
+ private:
+  std::vector<std::string> told_;
+};
+
+TEST_F(ToldServer, AMachineThatIsNotKnownIsToldOf) {
+  cart_.forgets(host_);
+  listen_and_tell({.tls = cart_.tls()});
+  EXPECT_FALSE(by_tls(kThere));
+  EXPECT_EQ(told(), std::vector<std::string>{"a connection from 127.0.0.2 was not let in: its key is not known here"});
+}
+
+TEST_F(ToldServer, WhoSpeaksOtherwiseIsToldOf) {
+  listen_and_tell({.tls = cart_.tls()});
+  const UniqueFd plain = from(kThere);
+  const auto question = pack_status_request().bytes();
+  (void)::send(plain.get(), question.data(), question.size(), MSG_NOSIGNAL);
+  EXPECT_TRUE(is_put_out(plain));
+  EXPECT_EQ(told(), std::vector<std::string>{"a connection from 127.0.0.2 was not let in: it does not speak TLS 1.3 as "
+                                             "Birdseye does"});
+}
+
+TEST_F(ToldServer, WhoBeginsAHandshakeAndStopsIsToldOf) {
+  listen_and_tell({.tls = cart_.tls(), .patience = Duration::from_ms(50)});
+  EXPECT_TRUE(is_put_out(from(kThere)));
+  EXPECT_EQ(told(),
+            std::vector<std::string>{"a connection from 127.0.0.2 was not let in: its handshake was not done in "
+                                     "time"});
+}
+
+TEST_F(ToldServer, WhoHasTooManyHandshakesIsToldOf) {
+  listen_and_tell({.tls = cart_.tls(), .patience = Duration::from_ms(600'000)});
+  std::list<UniqueFd> begun;
+  for (int i = 0; i < 4; ++i) begun.push_back(from(kElsewhere));
+  EXPECT_TRUE(is_put_out(from(kElsewhere)));
+  EXPECT_EQ(told(),
+            std::vector<std::string>{"a connection from 127.0.0.3 was not let in: it has 4 handshakes that are not "
+                                     "done"});
+}
+
+TEST_F(ToldServer, WhereThereIsNoTlsOtherMachinesAreToldOf) {
+  listen_and_tell({});
+  EXPECT_TRUE(is_put_out(from(kThere)));
+  EXPECT_EQ(told(),
+            std::vector<std::string>{"a connection from 127.0.0.2 was not let in: programs of this machine alone "
+                                     "are let in"});
+}
+
+TEST_F(ToldServer, NobodyWhoIsLetInIsToldOf) {
+  listen_and_tell({.tls = cart_.tls()});
+  EXPECT_EQ(first_word(by_tls(kThere)), "ready");
+  EXPECT_TRUE(is_served(from(kHere)));
+  EXPECT_EQ(told(), std::vector<std::string>{});
+}
+
+TEST(RefusalLog, TellsTheFirstAtOnceAndThoseAfterItTogether) {
+  std::vector<std::string> told;
+  RefusalLog log([&](const std::string& line) { told.push_back(line); });
+  const DeviceTime begin{1'000'000'000};
+  log.note("10.0.0.7", "its key is not known here", begin);
+  EXPECT_EQ(told, std::vector<std::string>{"a connection from 10.0.0.7 was not let in: its key is not known here"});
+  log.note("10.0.0.7", "its key is not known here", begin + Duration::from_ms(1));
+  log.note("10.0.0.8", "its key is not known here", begin + Duration::from_ms(2));
+  log.note("10.0.0.9", "it shows no key", begin + Duration::from_ms(3));
+  log.tell_due(begin + RefusalLog::kApart - Duration{1});
+  EXPECT_EQ(told.size(), 1U);
+  log.tell_due(begin + RefusalLog::kApart);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told.back(),
+            "3 more connections were not let in: it shows no key (1, the last from 10.0.0.9); its key is not known "
+            "here (2, the last from 10.0.0.8)");
+  log.tell_due(begin + RefusalLog::kApart + RefusalLog::kApart);
+  EXPECT_EQ(told.size(), 2U) << "there is nothing more to tell";
+}
+
+TEST(RefusalLog, AFloodIsAFewLinesThatCountAll) {
+  std::vector<std::string> told;
+  RefusalLog log([&](const std::string& line) { told.push_back(line); });
+  DeviceTime now{1'000'000'000};
+  for (int i = 0; i < 30'000; ++i) {
+    log.note("10.0.0." + std::to_string(i % 200), "its key is not known here", now);
+    now = now + Duration::from_ms(1);
+  }
+  ASSERT_EQ(told.size(), 3U) << "in half a minute";
+  EXPECT_EQ(told.back().rfind("10000 more connections were not let in: ", 0), 0U) << told.back();
+}
+
+TEST(RefusalLog, WhereNobodyIsToldNothingIsKept) {
+  RefusalLog log({});
+  log.note("10.0.0.7", "it shows no key", {1'000'000'000});
+  log.tell_due(DeviceTime{1'000'000'000} + RefusalLog::kApart);
+}
+
+TEST(CheckBind, TakesNoPortAndRefusesWhatIsNoneOfThisMachines) {
+  EXPECT_TRUE(check_bind(kHere));
+  EXPECT_TRUE(check_bind("0.0.0.0"));
+  const auto held = *listen_tcp(kHere, 0);
+  EXPECT_TRUE(check_bind(kHere)) << "also where a server listens";
+  const auto checked = check_bind("203.0.113.7");  // of a network for examples (RFC 5737)
+  ASSERT_FALSE(checked);
+  EXPECT_NE(checked.error().what.find("[wire] bind 203.0.113.7: this machine has no such address"), std::string::npos)
+      << checked.error().what;
+  const auto listened = listen_tcp("203.0.113.7", 0);
+  ASSERT_FALSE(listened);
+  EXPECT_EQ(listened.error().what, checked.error().what);
 }
 
 TEST(HandshakeLimits, AMachineThatHasToWaitIsNotFreedByManyOthers) {

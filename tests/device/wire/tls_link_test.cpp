@@ -197,7 +197,9 @@ TEST_F(Tls13, WhoShowsNoKeyIsNotLetIn) {
   connect();
   const std::shared_ptr<SSL_CTX> keyless(::SSL_CTX_new(::TLS_client_method()), ::SSL_CTX_free);
   (void)shake_with(*keyless);
-  EXPECT_FALSE(server_shook_);
+  ASSERT_FALSE(server_shook_);
+  EXPECT_EQ(server_shook_.error().code, Errc::bad_value);
+  EXPECT_EQ(server_shook_.error().what, "it shows no key");
 }
 
 TEST_F(Tls13, OlderVersionsAreRefused) {

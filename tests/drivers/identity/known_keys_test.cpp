@@ -4,6 +4,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <memory>
+#include <string>
+
+#include "drivers/identity/followed_keys.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/synced_files.hpp"
 
@@ -86,12 +90,27 @@ TEST(KnownKeys, AddsNoKeyTwiceNoNameOfAnotherKeyAndNoNameThatIsNoWord) {
     ASSERT_FALSE(added);
     EXPECT_NE(added.error().what.find("another key has the name"), std::string::npos) << added.error().what;
   }
-  for (const char* name : {"", "two words", "line\nbreak", "#remark", "own", ".", "..", "../cart", "cart/1"}) {
+  const std::string too_long(KnownKeys::kMostNameBytes + 1, 'n');
+  for (const char* name :
+       {"", "two words", "line\nbreak", "#remark", "own", ".", "..", "../cart", "cart/1", too_long.c_str()}) {
     const auto added = known->add(name, key_of(4));
     ASSERT_FALSE(added) << name;
     EXPECT_NE(added.error().what.find("is no name of a machine: give one word"), std::string::npos) << name;
   }
   EXPECT_EQ(testing::contents_of(folder / "known"), "cart-1 " + key_of(2).hex() + "\n");
+}
+
+TEST(KnownKeys, OfTheLongestNameAFileCanBeMade) {
+  const Scratch folder;
+  auto known = KnownKeys::read(folder.path(), kOwn);
+  ASSERT_TRUE(known);
+  const std::string longest(KnownKeys::kMostNameBytes, 'n');
+  ASSERT_TRUE(known->add(longest, key_of(2)));
+  (void)folder.file(longest + ".crt", "its certificate");
+  EXPECT_EQ(testing::contents_of(folder / (longest + ".crt")), "its certificate");
+  const std::string free = known->free_name(longest);
+  EXPECT_TRUE(KnownKeys::is_name(free)) << free;
+  EXPECT_TRUE(known->add(free, key_of(3)));
 }
 
 TEST(KnownKeys, RefusesADamagedLineByItsNumber) {
@@ -156,6 +175,71 @@ TEST(KnownKeys, RefusesAFileOfAnotherUser) {
   if (::chown(path.c_str(), 12345, static_cast<gid_t>(-1)) != 0) GTEST_SKIP() << "only root gives files away";
   EXPECT_NE(error_of(folder).find("known: belongs to another user (12345)"), std::string::npos) << error_of(folder);
   EXPECT_NE(error_of(folder).find("chown 0 " + path), std::string::npos) << error_of(folder);
+}
+
+class FollowedFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    say(line_of("cart-1", 2));
+    auto opened = FollowedKeys::open(folder_.path(), kOwn);
+    ASSERT_TRUE(opened) << opened.error().what;
+    keys_ = *std::move(opened);
+  }
+  static std::string line_of(const std::string& name, std::uint8_t first) {
+    return name + " " + key_of(first).hex() + "\n";
+  }
+  void say(const std::string& text) const {
+    (void)folder_.file("known", text);
+    fs::permissions(folder_ / "known", fs::perms::owner_read | fs::perms::owner_write);
+  }
+
+  Scratch folder_;
+  std::unique_ptr<FollowedKeys> keys_;
+};
+
+TEST_F(FollowedFile, IsTakenAsItIsAtEachQuestion) {
+  EXPECT_EQ(keys_->name_of(key_of(2)), "cart-1");
+  say(line_of("cart-2", 3));
+  EXPECT_EQ(keys_->name_of(key_of(3)), "cart-2");
+  EXPECT_FALSE(keys_->name_of(key_of(2))) << "its line was taken out";
+  fs::remove(folder_ / "known");
+  EXPECT_FALSE(keys_->name_of(key_of(3)));
+  EXPECT_EQ(keys_->name_of(key_of(1)), "theatre-3");
+  EXPECT_EQ(keys_->fault(), "");
+}
+
+TEST_F(FollowedFile, ABadLinePutsNobodyOutAndIsTold) {
+  say(line_of("cart-1", 2) + "theatre-3 KEY\n");
+  EXPECT_EQ(keys_->name_of(key_of(2)), "cart-1");
+  EXPECT_EQ(keys_->fault(),
+            (folder_ / "known").string() + ": line 2: is no machine's name and key; mend or remove the line");
+  say(line_of("cart-2", 3) + "theatre-3 KEY\n");
+  EXPECT_FALSE(keys_->name_of(key_of(3))) << "nothing of a file that cannot be used lets anybody in";
+  EXPECT_EQ(keys_->name_of(key_of(2)), "cart-1");
+  say(line_of("cart-2", 3));
+  EXPECT_EQ(keys_->fault(), "");
+  EXPECT_EQ(keys_->name_of(key_of(3)), "cart-2");
+  EXPECT_FALSE(keys_->name_of(key_of(2)));
+}
+
+TEST_F(FollowedFile, WhatWasReadToTellAFaultIsWhatIsKept) {
+  say(line_of("cart-2", 3));
+  EXPECT_EQ(keys_->fault(), "");
+  say("theatre-3 KEY\n");
+  EXPECT_EQ(keys_->name_of(key_of(3)), "cart-2");
+}
+
+TEST_F(FollowedFile, WhoeverMayWriteItLetsNobodyIn) {
+  say(line_of("cart-2", 3));
+  fs::permissions(folder_ / "known", fs::perms::others_write, fs::perm_options::add);
+  EXPECT_FALSE(keys_->name_of(key_of(3)));
+  EXPECT_EQ(keys_->name_of(key_of(2)), "cart-1");
+  EXPECT_NE(keys_->fault().find("chmod 644"), std::string::npos) << keys_->fault();
+}
+
+TEST_F(FollowedFile, IsRefusedWhereItCannotBeUsedToBeginWith) {
+  say("theatre-3 KEY\n");
+  EXPECT_FALSE(FollowedKeys::open(folder_.path(), kOwn));
 }
 
 }  // namespace

@@ -91,6 +91,38 @@ TEST(MachineKey, IsMadeOnceAndForItsOwnerAlone) {
   EXPECT_FALSE(verify(other->public_key(), message, read->sign(message)));
 }
 
+TEST(MachineKey, ALookMakesNone) {
+  const Scratch scratch;
+  const fs::path folder = scratch / "a/identity";
+  const auto none = MachineKey::look(folder);
+  ASSERT_TRUE(none) << none.error().what;
+  EXPECT_FALSE(*none);
+  EXPECT_FALSE(fs::exists(scratch / "a"));
+  const auto made = MachineKey::open(folder);
+  ASSERT_TRUE(made);
+  const auto seen = MachineKey::look(folder);
+  ASSERT_TRUE(seen && *seen);
+  EXPECT_EQ((*seen)->public_key(), made->public_key());
+}
+
+TEST(MachineKey, ALookFindsFaultWithWhatIsThereAndWithWhatCouldNotBeMade) {
+  const Scratch scratch;
+  const auto look_error = [](const fs::path& folder) {
+    const auto seen = MachineKey::look(folder);
+    return seen ? "" : seen.error().what;
+  };
+  ASSERT_TRUE(MachineKey::open(scratch / "identity"));
+  fs::permissions(scratch / "identity/key.pem", fs::perms::others_read, fs::perm_options::add);
+  EXPECT_NE(look_error(scratch / "identity").find("key.pem: others than its owner may read"), std::string::npos)
+      << look_error(scratch / "identity");
+  fs::permissions(scratch / "identity", fs::perms::others_write, fs::perm_options::add);
+  EXPECT_NE(look_error(scratch / "identity").find("identity: others than its owner may change"), std::string::npos)
+      << look_error(scratch / "identity");
+  const fs::path in_a_file = scratch.file("file", "");
+  EXPECT_NE(look_error(in_a_file / "identity").find("key.pem: cannot be made"), std::string::npos)
+      << look_error(in_a_file / "identity");
+}
+
 TEST(MachineKey, IsOneWhereSeveralProgramsMakeItAtOnce) {
   for (int round = 0; round < 20; ++round) {
     const Scratch scratch;
