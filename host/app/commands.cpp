@@ -8,6 +8,7 @@
 
 #include "calibration/base/lower_case.hpp"
 #include "drivers/system/program.hpp"
+#include "host/app/input_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/recording/recording_writer.hpp"
 
@@ -51,13 +52,31 @@ void check_against_output(const CLI::Option& out, const std::string& path, const
   }
 }
 
-void check_against_input(const CLI::Option& out, const std::string& path, const CLI::Option& in) {
+/// An option that is read, with all that the command reads by it.
+struct Input {
+  const CLI::Option* option;
+  std::vector<fs::path> files;  ///< and folders
+};
+
+Input input_of(const CLI::Option& option) {
+  Input in{&option, {}};
+  const auto add = [&in](const std::vector<fs::path>& files) {
+    in.files.insert(in.files.end(), files.begin(), files.end());
+  };
+  for (const std::string& given : option.results()) {
+    add(input_files(given));
+    if (option.check_name("--case")) add(files_of_case(given));
+  }
+  return in;
+}
+
+void check_against_input(const CLI::Option& out, const std::string& path, const Input& in) {
   std::error_code ignored;
   if (stays(path) || !fs::is_regular_file(path, ignored)) return;
-  for (const std::string& given : in.results()) {
-    if (fs::equivalent(given, path, ignored)) {
-      throw CLI::ValidationError(
-          out.get_name(), path + " is read, by " + in.get_name() + ", and would be written over; name another file");
+  for (const fs::path& file : in.files) {
+    if (fs::equivalent(file, path, ignored)) {
+      throw CLI::ValidationError(out.get_name(), path + " is read, by " + in.option->get_name() +
+                                                     ", and would be written over; name another file");
     }
   }
 }
@@ -74,12 +93,13 @@ bool is_taken_from(const CLI::Option& in, const fs::path& file) {
 }
 
 /// A file that is there, lies in a folder that is read, and is read with it.
-void check_against_folder(const CLI::Option& out, const std::string& path, const CLI::Option& in) {
+void check_against_folder(const CLI::Option& out, const std::string& path, const Input& in) {
   std::error_code ignored;
-  if (stays(path) || !fs::is_regular_file(path, ignored) || !is_taken_from(in, path)) return;
-  for (const std::string& given : in.results()) {
-    if (is_folder(given) && fs::equivalent(fs::absolute(path, ignored).parent_path(), given, ignored)) {
-      throw CLI::ValidationError(out.get_name(), path + " lies in the folder that is read, by " + in.get_name() +
+  if (stays(path) || !fs::is_regular_file(path, ignored) || !is_taken_from(*in.option, path)) return;
+  for (const fs::path& file : in.files) {
+    if (is_folder(file) && fs::equivalent(fs::absolute(path, ignored).parent_path(), file, ignored)) {
+      throw CLI::ValidationError(out.get_name(), path + " lies in the folder that is read, by " +
+                                                     in.option->get_name() +
                                                      ", and would be written over; name another file");
     }
   }
@@ -99,18 +119,20 @@ bool is_written_into(const CLI::Option& in, const std::vector<CLI::Option*>& opt
 
 void check_outputs(CLI::App& command) {
   const std::vector<CLI::Option*> options = command.get_options();
+  std::vector<Input> inputs;
+  for (const CLI::Option* const option : options) {
+    if (!is_output(*option)) inputs.push_back(input_of(*option));
+  }
   for (const CLI::Option* const out : options) {
     if (!is_output(*out)) continue;
     for (const std::string& path : out->results()) {
       if (path.empty()) continue;
       for (const CLI::Option* const other : options) {
-        if (other == out) continue;
-        if (is_output(*other)) {
-          check_against_output(*out, path, *other);
-        } else {
-          check_against_input(*out, path, *other);
-          if (!is_written_into(*other, options)) check_against_folder(*out, path, *other);
-        }
+        if (other != out && is_output(*other)) check_against_output(*out, path, *other);
+      }
+      for (const Input& in : inputs) {
+        check_against_input(*out, path, in);
+        if (!is_written_into(*in.option, options)) check_against_folder(*out, path, in);
       }
     }
   }

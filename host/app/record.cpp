@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "calibration/base/verdict.hpp"
 #include "drivers/system/clock.hpp"
@@ -30,6 +32,8 @@ constexpr std::size_t kMostRecordFramesWaiting = 120;
 constexpr Duration kSilence = Duration::from_ms(15'000);
 /// What the last lines and the sheet need, and other programs.
 constexpr std::uintmax_t kSpareBytes = std::uintmax_t{32} << 20U;
+/// By how much a recording may be shorter than asked for: the larger of the two.
+constexpr double kMostMissingShare = 0.1, kMostMissing_s = 0.5;
 
 struct RecordOptions {
   std::string server, video = "raw";
@@ -43,7 +47,16 @@ struct RecordOptions {
 struct Ending {
   std::string why;
   bool asked_for = false;  ///< by --seconds or by a signal
+  bool in_time = false;    ///< by --seconds
+  std::size_t left = 0;    ///< of what had come before the end, what could not be written
 };
+
+Result<void> write_event(const wire::Event& event, RecordingWriter& writer, const fs::path& folder) {
+  std::error_code unknown;
+  if (std::holds_alternative<wire::VideoFrame>(event) && fs::space(folder, unknown).available < kSpareBytes && !unknown)
+    return Error{Errc::io, fmt::format("{}: the disk is full; free some, or choose another --out", folder.string())};
+  return writer.add(event);
+}
 
 /// Until there is a reason to end.
 Ending record(EventStream& stream, RecordingWriter& writer, const RecordOptions& options, Progress& progress) {
@@ -53,7 +66,7 @@ Ending record(EventStream& stream, RecordingWriter& writer, const RecordOptions&
   while (!interrupted()) {
     const RecordingFigures& figures = writer.figures();
     if (options.seconds > 0 && began && (host_now() - *began).seconds() >= options.seconds)
-      return {fmt::format("{:g} s are over", options.seconds), true};
+      return {fmt::format("{:g} s are over", options.seconds), true, true};
     auto event = stream.next(Deadline::after(Duration::from_ms(200)));
     if (!event) return {event.error().what};
     if (!*event) {
@@ -62,15 +75,11 @@ Ending record(EventStream& stream, RecordingWriter& writer, const RecordOptions&
                             kSilence.seconds())};
       continue;
     }
-    const bool frame = std::holds_alternative<wire::VideoFrame>(**event);
-    if (frame || std::holds_alternative<wire::Birds>(**event)) {
+    if (acquired_of(**event)) {
       heard = host_now();
       if (!began) began = heard;
     }
-    std::error_code unknown;
-    if (frame && fs::space(options.out, unknown).available < kSpareBytes && !unknown)
-      return {fmt::format("{}: the disk is full; free some, or choose another --out", options.out.string())};
-    if (auto added = writer.add(**event); !added) return {added.error().what};
+    if (auto added = write_event(**event, writer, options.out); !added) return {added.error().what};
     if (const int second = static_cast<int>(figures.seconds()); std::exchange(told_s, second) != second) {
       progress(fmt::format("{} s, {} frames, {} poses", second, figures.frames, figures.measurements));
       if (auto there = writer.check_folder(); !there) return {there.error().what};
@@ -79,7 +88,47 @@ Ending record(EventStream& stream, RecordingWriter& writer, const RecordOptions&
   return {"it was interrupted", true};
 }
 
-Verdict judge(const RecordingWriter& writer, const Ending& ending, bool finished) {
+/// What came before the end and was not taken yet: no more than the stream's queues hold. All of it at once, before any
+/// is written, so that none of it gives way to what still comes.
+std::vector<wire::Event> take_waiting(EventStream& stream) {
+  std::size_t count = 0;
+  for (const QueueFill& fill : stream.fills()) count += fill.values;
+  std::vector<wire::Event> waiting;
+  while (waiting.size() < count) {
+    auto event = stream.next(Deadline::after(Duration::from_ms(0)));
+    if (!event || !*event) break;
+    waiting.push_back(**std::move(event));
+  }
+  return waiting;
+}
+
+/// After an end that was asked for; else the disk takes no more. Of what waited while something was written for long,
+/// that which is later than --seconds is no part of the recording.
+void write_waiting(const std::vector<wire::Event>& waiting, RecordingWriter& writer, const RecordOptions& options,
+                   Ending& ending) {
+  ending.left = waiting.size();
+  if (!ending.asked_for) return;
+  for (const wire::Event& event : waiting) {
+    const auto acquired = acquired_of(event);
+    const auto& first = writer.figures().first;
+    const bool later = options.seconds > 0 && acquired && first && (*acquired - *first).seconds() > options.seconds;
+    if (!later) {
+      if (auto added = write_event(event, writer, options.out); !added) {
+        ending = {.why = added.error().what, .left = ending.left};
+        return;
+      }
+    }
+    --ending.left;
+  }
+}
+
+/// For how long there are frames or poses: each stands for the time up to the next.
+double lasted_s(const RecordingFigures& figures) {
+  const auto count = static_cast<double>(std::max(figures.frames, figures.measurements));
+  return count > 1 ? figures.seconds() * count / (count - 1) : 0;
+}
+
+Verdict judge(const RecordingWriter& writer, const RecordOptions& options, const Ending& ending, bool finished) {
   const RecordingFigures& figures = writer.figures();
   Verdict verdict;
   const bool none = figures.frames == 0 && figures.measurements == 0;
@@ -91,6 +140,17 @@ Verdict judge(const RecordingWriter& writer, const Ending& ending, bool finished
   if (!writer.damage().empty()) verdict.add(Grade::fail, "nobody signed it");
   if (!finished && writer.damage().empty()) verdict.add(Grade::marginal, "not all of its files could be completed");
   if (none) return verdict;
+  const double missing_s = options.seconds - lasted_s(figures);
+  if (ending.in_time && missing_s > std::max(kMostMissing_s, kMostMissingShare * options.seconds)) {
+    verdict.add(
+        Grade::marginal,
+        fmt::format("{:.1f} s of the {:g} s that were asked for are in it: of the rest {} sent nothing, or this "
+                    "machine was too slow to keep it",
+                    figures.seconds(), options.seconds, options.server));
+  }
+  if (ending.left > 0)
+    verdict.add(Grade::marginal,
+                fmt::format("{} frames, poses and other messages that had come could not be written", ending.left));
   if (figures.frames == 0) verdict.add(Grade::marginal, "no frames came");
   if (figures.measurements == 0) verdict.add(Grade::marginal, "no poses came");
   const double all = static_cast<double>(figures.frames) + static_cast<double>(figures.frames_missing);
@@ -135,17 +195,20 @@ Result<ExitCode> run(const RecordOptions& options) {
   std::string peer, answered;
   bool plain = false;
   Drops drops;
+  std::vector<wire::Event> waiting;
   {
     EventStream stream(*std::move(client), kMostRecordFramesWaiting);
     ending = record(stream, **writer, options, progress);
+    waiting = take_waiting(stream);
     peer = stream.peer_words();
     answered = answered_words(options.server, stream.machine());
     plain = stream.is_plain();
     drops = stream.drops();
   }
+  write_waiting(waiting, **writer, options, ending);
   progress.keep("completing the files");
   const auto finished = (*writer)->finish(ending.why);
-  Verdict verdict = judge(**writer, ending, finished.has_value());
+  Verdict verdict = judge(**writer, options, ending, finished.has_value());
   if (!answered.empty()) verdict.add(Grade::pass, answered);
   if (!peer.empty()) verdict.add(Grade::pass, fmt::format("{} is {}", options.server, peer));
   if (plain) verdict.add(Grade::pass, "recorded without TLS: others on the network could read and change what came");

@@ -15,6 +15,7 @@
 #include "drivers/system/program.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
+#include "host/app/input_files.hpp"
 #include "host/case/error_picture.hpp"
 #include "host/case/registration_case.hpp"
 #include "host/case/registration_error.hpp"
@@ -291,9 +292,15 @@ ResultFolder folder_of(const RegisterViewsOptions& options) {
           "reasons"};
 }
 
+std::vector<fs::path> inputs_of(const RegisterViewsOptions& options) {
+  std::vector<fs::path> inputs = files_of_case(options.file);
+  inputs.push_back(options.file);
+  return inputs;
+}
+
 /// The organ is not in the pictures where it should be: that is a verdict too.
 Result<ExitCode> write_nothing_found(const RegisterViewsOptions& options, const Error& why) {
-  if (auto emptied = make_empty(folder_of(options), {options.file}); !emptied) return emptied.error();
+  if (auto emptied = make_empty(folder_of(options), inputs_of(options)); !emptied) return emptied.error();
   const std::string text =
       text_of({{"verdict", name_of(Grade::fail)}, {"reasons", {why.what}}, {"files", nlohmann::json::array()}});
   if (auto written = write_files({{options.out / "result.json", text}, {options.json, text}}); !written)
@@ -304,7 +311,8 @@ Result<ExitCode> write_nothing_found(const RegisterViewsOptions& options, const 
 
 Result<ExitCode> run(const RegisterViewsOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
-  if (auto is_free = check_free(folder_of(options), {options.file}, {options.json}); !is_free) return is_free.error();
+  if (auto is_free = check_free(folder_of(options), inputs_of(options), {options.json}); !is_free)
+    return is_free.error();
   auto read = read_case(options.file);
   if (!read) return read.error();
   const RegistrationCase& c = *read;
@@ -331,7 +339,7 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   }
   json["verdict"] = name_of(verdict.grade);
   json["reasons"] = verdict.reasons;
-  if (auto emptied = make_empty(folder_of(options), {options.file}); !emptied) return emptied.error();
+  if (auto emptied = make_empty(folder_of(options), inputs_of(options)); !emptied) return emptied.error();
   if (auto written = write_field(options.out / "field.mha", found.field); !written) return written.error();
   const std::string pose =
       "# patient_from_model: a deformed place of the model's frame -> the patient frame of the given poses, mm\n" +

@@ -31,6 +31,12 @@ std::int64_t padded_pixels(std::int64_t width_px, std::int64_t height_px) {
   return padded(width_px) * padded(height_px);
 }
 
+/// Of a file, whatever its name: by itself ffmpeg takes what stands before a colon for a protocol, and a leading - for
+/// an option.
+std::string ffmpeg_name(const std::filesystem::path& file) {
+  return "file:" + file.string();
+}
+
 /// By itself ffmpeg goes by what a file holds: a list of other files and addresses, or any of 500 codecs. Two threads
 /// decode faster than a film is played; with one for each processor, the memory that it needs would hang on the
 /// machine. So it would with OpenBLAS, which ffmpeg loads where it is installed, and which tries for ever to get more.
@@ -55,7 +61,7 @@ std::vector<std::string> decoder_command(const std::filesystem::path& film, std:
           "-threads",
           "2",
           "-i",
-          "file:" + film.string(),
+          ffmpeg_name(film),
           "-map",
           "0:v:0",
           "-vsync",
@@ -120,7 +126,7 @@ Result<Film> Film::open(const std::filesystem::path& path, int width_px, int hei
                            "+faststart",
                            "-f",
                            "mp4",
-                           part->path().string()},
+                           ffmpeg_name(part->path())},
                           log_of(*part), ChildProcess::Pipe::stdin_to_child, ChildProcess::Signals::ours_alone);
   if (!encoder) return std::move(encoder).error();
   return Film(std::move(*part), std::move(*encoder),

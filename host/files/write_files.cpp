@@ -2,11 +2,13 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <charconv>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <system_error>
@@ -77,15 +79,14 @@ Result<void> put(const UniqueFd& fd, const FileText& file) {
   return {};
 }
 
-/// Into a device or a pipe that is there. It is not waited for: one that nobody reads is refused.
-Result<void> put_as_it_is(const FileText& file) {
-  if (const UniqueFd own = own_descriptor(file.path)) return put(own, file);
-  const UniqueFd fd(::open(file.path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC | O_NOCTTY | O_NONBLOCK));
+/// A device or a pipe that is there. It is not waited for: one that nobody reads is refused.
+Result<UniqueFd> open_as_it_is(const fs::path& path) {
+  if (UniqueFd own = own_descriptor(path)) return own;
+  UniqueFd fd(::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC | O_NOCTTY | O_NONBLOCK));
   if (!fd && errno == ENXIO)
-    return Error{Errc::unreadable,
-                 fmt::format("{}: nobody reads this pipe; start its reader first", file.path.string())};
-  if (fd && ::fcntl(fd.get(), F_SETFL, O_APPEND) != 0) return cannot_be_written(file.path);
-  return put(fd, file);
+    return Error{Errc::unreadable, fmt::format("{}: nobody reads this pipe; start its reader first", path.string())};
+  if (!fd || ::fcntl(fd.get(), F_SETFL, O_APPEND) != 0) return cannot_be_written(path);
+  return fd;
 }
 
 /// Beside the file, in a file of its own by a name that nobody has: what lies there is left alone. It gets the mode of
@@ -105,6 +106,53 @@ Result<void> put_part(const FileText& file, fs::path& part) {
   return put(fd, file);
 }
 
+/// A file on its way to its place, and the former file until all files have got there.
+struct Replacement {
+  const FileText* file;
+  fs::path part = {};    ///< what replaces the file
+  fs::path former = {};  ///< a further name of the former file; empty: there was none, or it has no such name
+  bool is_new = false;   ///< there was no former file
+  bool is_done = false;  ///< it is in its place
+
+  /// By a hard link: until it is replaced, the former file stays in its place.
+  void keep_former() {
+    std::error_code ignored;
+    is_new = fs::symlink_status(file->path, ignored).type() == fs::file_type::not_found;
+    if (is_new) return;
+    former =
+        take_part_name(file->path, [&](const fs::path& name) { return ::link(file->path.c_str(), name.c_str()) == 0; });
+  }
+  bool replace() {
+    is_done = std::rename(part.c_str(), file->path.c_str()) == 0;
+    return is_done;
+  }
+  void forget_former() const {
+    std::error_code ignored;
+    if (!former.empty()) fs::remove(former, ignored);
+  }
+  /// Whether all is as it was.
+  [[nodiscard]] bool put_back() const {
+    std::error_code ignored;
+    if (!is_done) {
+      fs::remove(part, ignored);
+      forget_former();
+      return true;
+    }
+    if (is_new) return fs::remove(file->path, ignored);
+    return !former.empty() && std::rename(former.c_str(), file->path.c_str()) == 0;
+  }
+};
+
+/// The error, with what could not be put back.
+Error put_all_back(const std::vector<Replacement>& replaced, Error error) {
+  std::vector<std::string> names;
+  for (const Replacement& one : replaced) {
+    if (!one.put_back()) names.push_back(one.file->path.string());
+  }
+  if (!names.empty()) error.what += fmt::format(" (replaced already, and not put back: {})", fmt::join(names, ", "));
+  return error;
+}
+
 }  // namespace
 
 bool stays(const fs::path& path) {
@@ -119,11 +167,8 @@ bool same_file(const fs::path& a, const fs::path& b) {
 
 Result<void> write_files(const std::vector<FileText>& files) {
   std::error_code ignored;
-  std::vector<std::pair<const FileText*, fs::path>> replaced;  // with what replaces it
-  const auto give_up = [&](Error error) {
-    for (const auto& [file, part] : replaced) fs::remove(part, ignored);
-    return error;
-  };
+  std::vector<Replacement> replaced;
+  const auto give_up = [&](Error error) { return put_all_back(replaced, std::move(error)); };
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (files[i].path.empty() || stays(files[i].path)) continue;
     for (std::size_t j = 0; j < i; ++j) {
@@ -132,28 +177,42 @@ Result<void> write_files(const std::vector<FileText>& files) {
       }
     }
   }
+  std::vector<std::pair<const FileText*, UniqueFd>> as_they_are;
   for (const FileText& file : files) {
-    if (file.path.empty() || stays(file.path)) continue;
+    if (file.path.empty()) continue;
+    if (stays(file.path)) {
+      auto fd = open_as_it_is(file.path);
+      if (!fd) return give_up(fd.error());
+      as_they_are.emplace_back(&file, *std::move(fd));
+      continue;
+    }
     if (fs::is_directory(file.path, ignored)) {
       return give_up({Errc::unreadable, fmt::format("{}: is a folder; give a file", file.path.string())});
     }
-    fs::path& part = replaced.emplace_back(&file, fs::path()).second;
+    fs::path& part = replaced.emplace_back(Replacement{.file = &file}).part;
     if (auto written = put_part(file, part); !written) return give_up(written.error());
     if (auto synced = sync_file(part); !synced) return give_up(synced.error());
   }
+  if (replaced.size() > 1) {
+    for (Replacement& one : replaced) one.keep_former();
+  }
+  for (Replacement& one : replaced) {
+    if (!one.replace()) {
+      return give_up({Errc::unreadable,
+                      fmt::format("{}: cannot be replaced; check whose file and folder it is, or name another file",
+                                  one.file->path.string())});
+    }
+  }
   std::set<fs::path> folders;
-  for (const auto& [file, part] : replaced) {
-    std::error_code error;
-    fs::rename(part, file->path, error);
-    if (error) return give_up({Errc::unreadable, fmt::format("{}: cannot be replaced", file->path.string())});
-    folders.insert(file->path.parent_path());
+  for (const Replacement& one : replaced) {
+    one.forget_former();
+    folders.insert(one.file->path.parent_path());
   }
   for (const fs::path& folder : folders) {
     if (auto synced = sync_folder(folder); !synced) return synced;
   }
-  for (const FileText& file : files) {
-    if (file.path.empty() || !stays(file.path)) continue;
-    if (auto written = put_as_it_is(file); !written) return written;
+  for (const auto& [file, fd] : as_they_are) {
+    if (auto written = put(fd, *file); !written) return written;
   }
   return {};
 }

@@ -91,16 +91,29 @@ Result<AdmittedRecording> admit_appliance_recording(const fs::path& path, const 
   return AdmittedRecording{*std::move(doubt), ""};
 }
 
+/// Whether a folder holds a session recording, or what is left of one.
+bool is_session_recording(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::exists(folder / kRecordingSheet, ignored) || fs::exists(folder / kRecordingEvents, ignored);
+}
+
 }  // namespace
 
 std::optional<fs::path> recording_at(const fs::path& path) {
   if (is_appliance_recording(path)) return path;
-  std::error_code ignored;
-  const fs::path folder = fs::is_directory(path, ignored) ? path
-                          : path.has_parent_path()        ? path.parent_path()
-                                                          : fs::path(".");
-  const bool is_one = fs::exists(folder / kRecordingSheet, ignored) || fs::exists(folder / kRecordingEvents, ignored);
-  return is_one ? std::optional(folder) : std::nullopt;
+  std::error_code error;
+  if (fs::is_directory(path, error)) return is_session_recording(path) ? std::optional(path) : std::nullopt;
+  // A link among a recording's files is one of them, and so is a file that a link elsewhere leads to.
+  constexpr int kMostLinks = 40;  // as many as the kernel follows
+  fs::path at = path;
+  for (int n = 0; n <= kMostLinks; ++n) {
+    const fs::path folder = at.has_parent_path() ? at.parent_path() : fs::path(".");
+    if (is_session_recording(folder)) return folder;
+    const fs::path to = fs::read_symlink(at, error);
+    if (error) break;
+    at = folder / to;
+  }
+  return std::nullopt;
 }
 
 Result<AdmittedRecording> admit_recording(const fs::path& named, const Authors& authors) {

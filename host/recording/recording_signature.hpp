@@ -30,8 +30,8 @@ struct RecordingSeal {
 /// Reads all of the recording's files: as long as the disk takes.
 Result<RecordingSeal> read_recording_seal(const std::filesystem::path& folder);
 
-/// The recording that a path is, or that the file at it belongs to: its poses are the recording's. Empty: there is
-/// none.
+/// The recording that a path is, or that the file at it belongs to, whichever links lead there: its poses are the
+/// recording's. Empty: there is none.
 std::optional<std::filesystem::path> recording_at(const std::filesystem::path& path);
 
 struct AdmittedRecording {

@@ -14,6 +14,7 @@
 #include "hw-sim/phantom/dicom_series.hpp"
 #include "hw-sim/phantom/grid.hpp"
 #include "hw-sim/phantom/image_files.hpp"
+#include "tests/support/cart_script.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/json_file.hpp"
@@ -369,6 +370,88 @@ TEST(Commands, WhatIsReadIsNotWrittenOver) {
   const std::string good =
       "register fiducials --ct " + points + " --tracker " + scratch.file("t.txt", "7 0 1\n107 0 1\n7 80 1\n17 20 61\n");
   EXPECT_EQ(run("birdseye", good + " --out " + here + " --json /dev/null --report /dev/null").code, 0);
+}
+
+/// By a pattern, a camera's name behind a colon, a header that names files, or a case.
+TEST(Commands, WhatIsReadWithoutItsNameBeingGivenIsNotWrittenOver) {
+  const Scratch scratch;
+  fs::create_directories(scratch / "in/o");
+  const auto in = [&scratch](const std::string& name) { return (scratch / "in" / name).string(); };
+  std::vector<std::string> kept;
+  const auto keep = [&](const std::string& name) { kept.push_back(scratch.file("in/" + name, "the user's own")); };
+  for (const char* name : {"1378.txt", "ct.raw", "ct002.raw", "a ct.raw", "slice1.raw", "ct.img", "CT2.IMG", "view.png",
+                           "mask.png", "o/field.mha"})
+    keep(name);
+  const auto chain = scratch.file("in/chain.yaml", "cam0: {}\n");
+  (void)scratch.file("in/ct.mhd", "NDims = 3\nElementDataFile = ct.raw\n");
+  (void)scratch.file("in/blank.mhd", "NDims = 3\nElementDataFile = a ct.raw\n");
+  (void)scratch.file("in/many.nhdr", "NRRD0004\ndata file: ct%03d.raw 1 2 1\n");
+  (void)scratch.file("in/list.nhdr", "NRRD0004\ndata file: LIST\nslice0.raw\nslice1.raw\n");
+  (void)scratch.file("in/ct.hdr", "");
+  (void)scratch.file("in/CT2.HDR", "");
+  (void)scratch.file("in/case.toml",
+                     "[volume]\npath = \"ct.mhd\"\n[model]\ninitial = \"o/field.mha\"\n[[view]]\nimage = 'view.png'\n"
+                     "camera = \"chain.yaml:cam0\"\nmask = \"./mask.png\"\n");
+  const std::vector<std::string> over{"would be written over"};
+  for (const char* option : {"--out", "--json", "--report"})
+    expect_refused("birdseye", "calibrate tip --poses '" + in("13*.txt") + "' " + option + " " + in("1378.txt"), over);
+  expect_refused(
+      "birdseye",
+      "calibrate camera --board chessboard:9x6:5mm --images '" + in("vie?.png") + "' --out " + in("view.png"), over);
+  expect_refused("birdseye", "render --volume ct --pose p --camera " + chain + ":cam0 --out x.png --json " + chain,
+                 over);
+  for (const auto& [header, voxels] : {std::pair{"ct.mhd", "ct.raw"},
+                                       {"blank.mhd", "a ct.raw"},
+                                       {"many.nhdr", "ct002.raw"},
+                                       {"list.nhdr", "slice1.raw"},
+                                       {"ct.hdr", "ct.img"},
+                                       {"CT2.HDR", "CT2.IMG"}})
+    expect_refused("birdseye", "volume info " + in(header) + " --json '" + in(voxels) + "'", over);
+  const std::string views = "register views --case " + in("case.toml") + " --out ";
+  for (const char* name : {"view.png", "mask.png", "ct.raw", "chain.yaml", "ct.mhd"})
+    expect_refused("birdseye", views + (scratch / "o").string() + " --json " + in(name), over, scratch / "o");
+  expect_refused("birdseye", views + in("o"), {"o/field.mha: is read, and would be written over", "another --out"});
+  for (const std::string& file : kept) EXPECT_EQ(testing::contents_of(file), "the user's own") << file;
+  EXPECT_EQ(testing::contents_of(chain), "cam0: {}\n");
+  // What no header names, and no pattern matches, is the user's to have written anew.
+  for (const char* name : {"slice2.raw", "figures.json"}) {
+    (void)scratch.file(std::string("in/") + name, "an earlier run's");
+    for (const std::string& command :
+         {"volume info " + in("list.nhdr"), "calibrate tip --poses '" + in("13*.txt") + "'"}) {
+      const auto result = run("birdseye", command + " --json " + in(name));
+      EXPECT_EQ(result.output.find("would be written over"), std::string::npos) << result.output;
+    }
+  }
+}
+
+/// An encoder that takes nothing for longer than is recorded, and an appliance that stands still though it is
+/// connected.
+constexpr const char* kSlowAndShort = R"sh(mkdir slow
+printf '#!/bin/sh\nsleep 4.5\nexec %s "$@"\n' $(command -v ffmpeg) > slow/ffmpeg; chmod +x slow/ffmpeg
+record="$bin/birdseye record --server $server"
+PATH=$PWD/slow:$PATH $record --out late --seconds 4 --video compressed --json late.json; echo "late $?"
+$record --out short --seconds 6 --json short.json > short.log 2>&1 &
+short=$!
+for n in $(seq 150); do [ $(cat short/events.jsonl 2>/dev/null | wc -l) -gt 50 ] && break; sleep 0.1; done
+kill -STOP $appliance
+wait $short; echo "short $?"
+kill -CONT $appliance
+cat short.log
+)sh";
+
+TEST(Commands, ARecordingHoldsWhatCameBeforeItsEndAndSaysWhereThatIsTooLittle) {
+  const Scratch scratch;
+  const auto found = testing::run_at_cart(scratch, {}, kSlowAndShort);
+  for (const char* line : {"late 0", "short 0", "of the 6 s that were asked for are in it"})
+    EXPECT_NE(found.output.find(line), std::string::npos) << line << "\n" << found.output;
+  const nlohmann::json late = read_json(scratch / "late.json"), shorter = read_json(scratch / "short.json");
+  EXPECT_GT(late["frames"], 50) << found.output;
+  EXPECT_GT(late["measurements"], 200);
+  EXPECT_LE(late["seconds"], 4) << "what came later is no part of it";
+  EXPECT_EQ(found.output.find("of the 4 s that were asked for"), std::string::npos) << found.output;
+  EXPECT_EQ(read_json(scratch / "late/recording.json")["frames"], late["frames"]);
+  EXPECT_EQ(shorter["verdict"], "marginal");
+  EXPECT_LT(shorter["seconds"], 5.4);
 }
 
 /// What a command wrote into a folder that it reads, and no reader takes, is written anew by the next run.

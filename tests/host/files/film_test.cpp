@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include <fstream>
+#include <iterator>
 
 #include "drivers/system/child_process.hpp"
 #include "host/files/picture.hpp"
@@ -60,6 +61,20 @@ TEST(Film, ItsFramesAreReadInTheirOrderAndItsEndIsTold) {
   ASSERT_FALSE(beyond);
   EXPECT_EQ(beyond.error().code, Errc::bad_format);
   EXPECT_NE(beyond.error().what.find("5 frames are whole"), std::string::npos) << beyond.error().what;
+}
+
+/// As ffmpeg names protocols and options.
+TEST(Film, InARelativeFolderOfAnyNameIsWrittenAndRead) {
+  const Scratch scratch;
+  const fs::path before = fs::current_path();
+  fs::current_path(scratch.path());
+  for (const char* folder : {"2026-11-30T16:30:00", "-x", "--", "http:", "%03d"}) {
+    fs::create_directory(folder);
+    auto reader = FilmReader::open(film_of(fs::path(folder) / "film.mp4", 64, 48, 2), 64, 48);
+    EXPECT_TRUE(reader && reader->read(1)) << folder;
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder), {}), 1) << folder;
+  }
+  fs::current_path(before);
 }
 
 TEST(Film, OneOfAnotherSizeIsRefusedByBothSizes) {

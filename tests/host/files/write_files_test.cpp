@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -15,6 +17,28 @@
 #include "host/files/result_folder.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/synced_files.hpp"
+
+namespace birdseye::host {
+namespace {
+
+std::string fixed_place;  ///< that nothing is renamed to
+bool has_links = true;    ///< the disk
+
+}  // namespace
+}  // namespace birdseye::host
+
+// In place of libc's.
+extern "C" int rename(const char* from, const char* to) noexcept {
+  if (birdseye::host::fixed_place != to)
+    return static_cast<int>(::syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0));
+  errno = EPERM;
+  return -1;
+}
+extern "C" int link(const char* from, const char* to) noexcept {
+  if (birdseye::host::has_links) return static_cast<int>(::syscall(SYS_linkat, AT_FDCWD, from, AT_FDCWD, to, 0));
+  errno = EPERM;
+  return -1;
+}
 
 namespace birdseye::host {
 namespace {
@@ -111,9 +135,66 @@ TEST(WriteFiles, IsOnTheDiskByItsName) {
 TEST(WriteFiles, WhereOneCannotBeWrittenNoneIsReplaced) {
   const birdseye::testing::Scratch scratch;
   const std::string path = scratch.file("a.txt", "former");
-  EXPECT_FALSE(write_files({{path, "new"}, {scratch / "no folder" / "b.txt", "new"}}));
+  const auto refused = write_files({{path, "new"}, {scratch / "no folder" / "b.txt", "new"}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().what.find("not put back"), std::string::npos) << refused.error().what;
   EXPECT_EQ(birdseye::testing::contents_of(path), "former");
   EXPECT_EQ(files_in(scratch), 1U);
+}
+
+/// As in another's folder where each may remove but the own files.
+TEST(WriteFiles, WhereOneCannotBeReplacedAllAreAsBefore) {
+  const birdseye::testing::Scratch scratch;
+  const std::string first = scratch.file("a.txt", "former a"), last = scratch.file("z.txt", "former z");
+  const std::filesystem::path fresh = scratch / "new.txt";
+  std::filesystem::permissions(first, std::filesystem::perms(0640));
+  std::filesystem::create_symlink("a.txt", scratch / "link.txt");
+  fixed_place = last;
+  const auto refused = write_files({{first, "new"}, {fresh, "new"}, {last, "new"}});
+  const auto of_link = write_files({{scratch / "link.txt", "new"}, {last, "new"}});
+  fixed_place.clear();
+  for (const auto& one : {refused, of_link}) {
+    ASSERT_FALSE(one);
+    EXPECT_NE(one.error().what.find("z.txt: cannot be replaced"), std::string::npos) << one.error().what;
+    EXPECT_EQ(one.error().what.find("not put back"), std::string::npos) << one.error().what;
+  }
+  EXPECT_EQ(birdseye::testing::contents_of(first), "former a");
+  EXPECT_EQ(std::filesystem::status(first).permissions(), std::filesystem::perms(0640));
+  EXPECT_TRUE(std::filesystem::is_symlink(scratch / "link.txt"));
+  EXPECT_EQ(birdseye::testing::contents_of(last), "former z");
+  EXPECT_FALSE(std::filesystem::exists(fresh));
+  EXPECT_EQ(files_in(scratch), 3U) << "nothing else is left";
+  ASSERT_TRUE(write_files({{first, "new"}, {fresh, "new"}, {last, "new"}}));
+  for (const std::filesystem::path& path : {std::filesystem::path(first), fresh, std::filesystem::path(last)})
+    EXPECT_EQ(birdseye::testing::contents_of(path), "new") << path;
+  EXPECT_EQ(files_in(scratch), 4U) << "no former one is left";
+}
+
+TEST(WriteFiles, WhereAPipeTakesNothingNoFileIsReplaced) {
+  const birdseye::testing::Scratch scratch;
+  const std::string path = scratch.file("a.txt", "former"), pipe = scratch / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const auto refused = write_files({{pipe, "nobody reads it"}, {path, "new"}});
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().what.find("nobody reads this pipe"), std::string::npos) << refused.error().what;
+  EXPECT_EQ(birdseye::testing::contents_of(path), "former");
+  EXPECT_EQ(files_in(scratch), 2U);
+}
+
+/// As some sticks and shares are.
+TEST(WriteFiles, OnADiskWithoutHardLinksWhatStaysReplacedIsNamed) {
+  const birdseye::testing::Scratch scratch;
+  const std::string first = scratch.file("a.txt", "former"), last = scratch.file("z.txt", "former");
+  fixed_place = last;
+  has_links = false;
+  const auto refused = write_files({{first, "new"}, {scratch / "new.txt", "new"}, {last, "new"}});
+  fixed_place.clear();
+  has_links = true;
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().what.find("z.txt: cannot be replaced"), std::string::npos) << refused.error().what;
+  EXPECT_NE(refused.error().what.find("not put back: " + first + ")"), std::string::npos) << refused.error().what;
+  EXPECT_EQ(birdseye::testing::contents_of(first), "new");
+  EXPECT_EQ(files_in(scratch), 2U);
 }
 
 const std::vector<std::filesystem::path> kNoInputs;

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "host/recording/recording_reader.hpp"
 #include "host/recording/recording_writer.hpp"
@@ -80,6 +82,47 @@ TEST(RecordingSignature, OfThisMachineIsAdmittedAndCoversEachOfItsFiles) {
     fs::remove(scratch / "r" / file);
     EXPECT_NE(refusal(scratch / "r", own), "") << file;
   }
+}
+
+/// The poses that a link leads to are the recording's, by whatever name they are given.
+TEST(RecordingSignature, AFileThatALinkLeadsToIsTheRecordingsToo) {
+  const Scratch scratch;
+  const Authors own = Authors::for_once();
+  record(scratch / "r", own);
+  for (const char* folder : {"cart", "other", "plain"}) fs::create_directory(scratch / folder);
+  fs::create_symlink("../r/tracker.igs.mha", scratch / "cart/latest.igs.mha");
+  fs::create_symlink(scratch / "cart/latest.igs.mha", scratch / "other/link.igs.mha");
+  fs::create_directory_symlink("r", scratch / "linked");
+  fs::create_symlink("linked/tracker.igs.mha", scratch / "through.igs.mha");
+  fs::create_directory_symlink("cart", scratch / "cart_too");
+  const std::vector<std::string> names = {"cart/latest.igs.mha",
+                                          "other/link.igs.mha",
+                                          "linked",
+                                          "linked/tracker.igs.mha",
+                                          "through.igs.mha",
+                                          "cart_too/latest.igs.mha",
+                                          "cart/../cart_too/latest.igs.mha"};
+  for (const std::string& name : names) {
+    const auto found = recording_at(scratch / name);
+    ASSERT_TRUE(found) << name;
+    EXPECT_TRUE(fs::equivalent(*found, scratch / "r")) << name << " " << *found;
+    EXPECT_EQ(refusal(scratch / name, own), "") << name;
+  }
+  std::ofstream(scratch / "r/tracker.igs.mha", std::ios::app) << "added";
+  for (const std::string& name : names)
+    EXPECT_NE(refusal(scratch / name, {own.machine, true}).find("was changed since"), std::string::npos) << name;
+  // What a recording's name leads to elsewhere stands in the place of its file.
+  (void)scratch.file("plain/poses.igs.mha", "other poses");
+  fs::remove(scratch / "r/tracker.igs.mha");
+  fs::create_symlink(scratch / "plain/poses.igs.mha", scratch / "r/tracker.igs.mha");
+  for (const char* name : {"r/tracker.igs.mha", "cart/latest.igs.mha", "other/link.igs.mha"})
+    EXPECT_NE(refusal(scratch / name, {own.machine, true}).find("was changed since"), std::string::npos) << name;
+  // A link that leads to no recording, to nothing, or round and round.
+  fs::create_symlink("poses.igs.mha", scratch / "plain/link.igs.mha");
+  fs::create_symlink("none", scratch / "plain/nothing");
+  fs::create_symlink("round", scratch / "plain/round");
+  for (const char* name : {"link.igs.mha", "nothing", "round"})
+    EXPECT_FALSE(recording_at(scratch / "plain" / name)) << name;
 }
 
 TEST(RecordingSignature, NoBitOfASheetMakesARecordingOneThatNobodySigned) {
