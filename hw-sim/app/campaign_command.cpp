@@ -6,12 +6,14 @@
 #include <memory>
 #include <string>
 
-#include "drivers/system/local_programs.hpp"
 #include "hw-sim/campaign/campaign.hpp"
 
 namespace birdseye::hw_sim {
 
 namespace {
+
+// This very program, whatever stands at its path meanwhile.
+constexpr const char* kOurselves = "/proc/self/exe";
 
 struct CampaignOptions {
   SeedRun settings;
@@ -71,8 +73,7 @@ void print(const SeedRun& settings, const StudiedOperations& operations, const O
 /// Of the first seed that broke a law.
 void print_shortest(const SeedRun& settings, const StudiedOperations& operations, std::uint64_t seed) {
   constexpr Duration kPatience = Duration::from_ms(600'000);
-  const auto script =
-      shortest_script_of(seed, operations, beside_us("birdseye-sim"), settings.folder / "campaign.log", kPatience);
+  const auto script = shortest_script_of(seed, operations, kOurselves, settings.folder / "campaign.log", kPatience);
   fmt::print("the shortest script for seed {}:{}{}", seed, script ? "\n" : " ",
              script ? *script : script.error().what + "\n");
 }
@@ -83,36 +84,40 @@ void say(std::FILE* where, const std::string& line) {
   std::fflush(where);
 }
 
-/// Operations, and their sum.
+/// Operations, and their sum, also where some seeds gave no result.
 Result<void> run_operations(const SeedRun& settings, const CampaignOptions& options, Ranks* ranks, bool& broken) {
   const StudiedOperations& operations = options.operations;
-  const auto study = study_of_operations(operations, beside_us("birdseye-sim"));
+  const auto study = study_of_operations(operations, kOurselves);
   if (!study) return study.error();
-  const auto results = run_seeds(
+  const auto done = run_seeds(
       *study, settings, [](const std::string& line) { say(stdout, line); }, ranks);
-  if (!results) return results.error();
-  if (*results == nullptr) return {};
-  const auto sum = sum_of(**results, settings.first_seed, settings.last_seed);
+  if (!done) return done.error();
+  if (done->results == nullptr) return {};
+  const auto sum = sum_of(*done->results, settings.first_seed, settings.last_seed);
   if (!sum) return sum.error();
-  if (sum->operations == 0)
+  if (sum->operations == 0) {
+    if (!done->all) return done->all;
     return Error{Errc::timeout, "no seed was run to its end, so nothing was judged; give it more time (--at-most)"};
+  }
   print(settings, operations, *sum);
   broken = sum->laws_broken > 0;
   if (options.shortest && sum->first_broken) print_shortest(settings, operations, *sum->first_broken);
-  return {};
+  return done->all;
 }
 
 /// Any other command. Standard output is for its lines.
 Result<void> run_command(const SeedRun& settings, const CampaignOptions& options, Ranks* ranks) {
-  const auto results = run_seeds(
+  const auto done = run_seeds(
       study_of(options.command, Duration::from_seconds(options.patience_s)), settings,
       [](const std::string& line) { say(stderr, line); }, ranks);
-  if (!results) return results.error();
-  if (*results == nullptr || !options.print) return {};
-  return (*results)->for_each(settings.first_seed, settings.last_seed, [](const SeedLine& one) -> Result<void> {
+  if (!done) return done.error();
+  if (done->results == nullptr || !options.print) return done->all;
+  const auto print_line = [](const SeedLine& one) -> Result<void> {
     fmt::print("{}\n", one.line);
     return {};
-  });
+  };
+  const auto printed = done->results->for_each(settings.first_seed, settings.last_seed, print_line);
+  return printed ? done->all : printed;
 }
 
 Result<void> run(const CampaignOptions& options, bool& broken) {

@@ -4,13 +4,16 @@
 #include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 
 #include "host/files/write_files.hpp"
 #include "hw-sim/app/kept_inputs.hpp"
@@ -22,6 +25,8 @@
 namespace birdseye::hw_sim {
 
 namespace {
+
+constexpr double kLeast_minutes = 0.5, kMost_minutes = 600;
 
 struct OperationOptions {
   SimulatedOperation operation;
@@ -72,7 +77,8 @@ Result<void> print_shortest(const SimulatedOperation& operation, const Operation
   constexpr double kAfter_s = 12;  // a law may be judged some seconds after what it judges
   const std::string law = out.broken.front().law;
   SimulatedOperation shorter = operation;
-  shorter.minutes = std::min(operation.minutes, (out.broken.front().at_s + kAfter_s) / 60);
+  const double needed = std::max(kLeast_minutes, (out.broken.front().at_s + kAfter_s) / 60);
+  shorter.minutes = std::min(operation.minutes, std::ceil(100 * needed) / 100);
   std::optional<Error> failed;
   const auto breaks = [&](const FaultScript& script) {
     shorter.faults = script;
@@ -84,8 +90,8 @@ Result<void> print_shortest(const SimulatedOperation& operation, const Operation
   if (!breaks(script)) shorter.minutes = operation.minutes;
   script = shortest_script(script, breaks);
   if (failed) return *failed;
-  fmt::print("# {} is broken by this script: birdseye-sim operation --seed {} --minutes {:.2f}{}{} --script FILE\n{}",
-             law, operation.seed, std::ceil(100 * shorter.minutes) / 100, operation.pictures ? " --pictures" : "",
+  fmt::print("# {} is broken by this script: birdseye-sim operation --seed {} --minutes {}{}{} --script FILE\n{}", law,
+             operation.seed, shorter.minutes, operation.pictures ? " --pictures" : "",
              fmt::format(" --reference {}", out.reference ? "patient" : "none"), text_of(script));
   return {};
 }
@@ -112,8 +118,30 @@ void print(const OperationOutcome& out, const OperationResult& result) {
   fmt::print("{}; hash {}\n", words_of_laws(result), result.hash);
 }
 
-Result<void> run(const OperationOptions& options, bool& broken) {
+/// Whether write_files() will surely fail there, as far as can be told before there is anything to write.
+Result<void> check_output(const std::filesystem::path& file) {
+  if (file.empty()) return {};
+  std::error_code ignored;
+  const bool as_it_is = host::stays(file);
+  const auto folder = std::filesystem::absolute(file, ignored).parent_path();
+  if (std::filesystem::is_directory(file, ignored))
+    return Error{Errc::unreadable, file.string() + ": is a folder; give a file"};
+  if (::access(as_it_is ? file.c_str() : folder.c_str(), W_OK) == 0) return {};
+  return Error{Errc::unreadable, file.string() + ": cannot be written; check the folder and its permissions"};
+}
+
+/// Before an operation of minutes is run for them.
+Result<void> check_outputs(const OperationOptions& options) {
   if (auto kept = keep_inputs({options.log, options.faults}, {options.script}); !kept) return kept;
+  const bool both = !options.log.empty() && !options.faults.empty() && !host::stays(options.log);
+  if (both && host::same_file(options.log, options.faults))
+    return Error{Errc::bad_value, options.log.string() + ": is named by --log and by --faults; give two files"};
+  if (auto log = check_output(options.log); !log) return log;
+  return check_output(options.faults);
+}
+
+Result<void> run(const OperationOptions& options, bool& broken) {
+  if (auto checked = check_outputs(options); !checked) return checked;
   SimulatedOperation operation = options.operation;
   // Without pictures other cores would only wait for work: a third of all processor time.
   const int cores = options.cores > 0 ? options.cores : operation.pictures ? tbb::info::default_concurrency() : 1;
@@ -127,12 +155,13 @@ Result<void> run(const OperationOptions& options, bool& broken) {
   spdlog::set_level(spdlog::level::off);  // the appliance's own log: what it says to the host is in ours
   const auto out = run_operation(operation);
   if (!out) return out.error();
-  if (auto written = host::write_files({{options.log, out->log}, {options.faults, text_of(out->faults)}}); !written)
-    return written;
   const OperationResult result = result_of(operation, *out);
   options.line ? fmt::print("{}\n", line_of(result)) : print(*out, result);
   broken = result.laws_broken > 0;
-  return broken && options.shortest ? print_shortest(operation, *out) : Result<void>();
+  std::fflush(stdout);  // the files may be on a disk that is full
+  const auto written = host::write_files({{options.log, out->log}, {options.faults, text_of(out->faults)}});
+  const auto shortest = broken && options.shortest ? print_shortest(operation, *out) : Result<void>();
+  return written ? shortest : written;
 }
 
 }  // namespace
@@ -142,7 +171,8 @@ void add_operation_command(CLI::App& app, const Take& take, bool& broken) {
   CLI::App& command = *app.add_subcommand(
       "operation", "one operation in virtual time, with faults at random: whether anything breaks a law");
   command.add_option("--seed", options->operation.seed, "everything random follows from it");
-  command.add_option("--minutes", options->operation.minutes, "how long it is")->check(CLI::Range(0.5, 600.0));
+  command.add_option("--minutes", options->operation.minutes, "how long it is")
+      ->check(CLI::Range(kLeast_minutes, kMost_minutes));
   command.add_flag("--pictures", options->operation.pictures,
                    "the video shows what the scope sees, and the window watches how it moves");
   command

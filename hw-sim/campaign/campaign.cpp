@@ -10,6 +10,7 @@
 
 #include "calibration/record/sha256.hpp"
 #include "drivers/system/child_process.hpp"
+#include "hw-sim/campaign/children_folder.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -78,6 +79,8 @@ Result<std::string> shortest_script_of(std::uint64_t seed, const StudiedOperatio
                                        Duration patience) {
   std::vector<std::string> command = command_of(std::to_string(seed), operations, program);
   command.emplace_back("--shortest");
+  const auto temporary = ChildrenFolder::make();
+  if (!temporary) return temporary.error();
   auto child = ChildProcess::start(command, log, ChildProcess::Pipe::stdout_from_child, ChildProcess::Signals::with_us,
                                    ChildProcess::Life::ours);
   if (!child) return child.error();

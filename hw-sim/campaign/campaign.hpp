@@ -16,7 +16,7 @@ struct StudiedOperations {
   bool pictures = false;  ///< the video shows what the scope sees
 };
 
-/// Simulated operations. One that ends without a result counts as one that broke a law.
+/// Simulated operations. One that crashes, or ends without a result, counts as one that broke a law.
 /// program: it knows `operation --line`; results of another build of it are another study's. Fails where it cannot be
 /// read.
 Result<SeedStudy> study_of_operations(const StudiedOperations& operations, const std::string& program);

@@ -7,14 +7,41 @@
 
 namespace birdseye::hw_sim {
 
+namespace {
+
+constexpr const char* kMoveAway = "move this file away, and its seeds are run again";
+
+const char* remedy_of(int sqlite_code) {
+  constexpr int kPrimary = 0xFF;
+  switch (sqlite_code & kPrimary) {
+    case SQLITE_NOTADB:
+    case SQLITE_CORRUPT:
+    case SQLITE_ERROR:  // it has other tables than a campaign's
+      return kMoveAway;
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return "another program writes to it; start the campaign again once that program has ended";
+    case SQLITE_FULL:
+      return "make room on its disk";
+    case SQLITE_PERM:
+    case SQLITE_READONLY:
+    case SQLITE_CANTOPEN:
+    case SQLITE_AUTH:
+      return "check the permissions of the file and of its folder";
+    default:
+      return "check its disk";
+  }
+}
+
+}  // namespace
+
 struct SeedResults::Database {
   std::string name;
   sqlite3* handle = nullptr;
   ~Database() { sqlite3_close(handle); }
 
   [[nodiscard]] Error fault() const {
-    return {Errc::io, fmt::format("{}: {}; check the folder's permissions and the space on its disk", name,
-                                  sqlite3_errmsg(handle))};
+    return {Errc::io, fmt::format("{}: {}; {}", name, sqlite3_errmsg(handle), remedy_of(sqlite3_errcode(handle)))};
   }
   [[nodiscard]] Result<void> run(const char* text) const {
     if (sqlite3_exec(handle, text, nullptr, nullptr, nullptr) == SQLITE_OK) return {};
@@ -70,6 +97,13 @@ Result<std::unique_ptr<SeedResults>> SeedResults::open(const std::filesystem::pa
   if (sqlite3_open(file.c_str(), &database->handle) != SQLITE_OK) return database->fault();
   constexpr int kPatience_ms = 10'000;
   sqlite3_busy_timeout(database->handle, kPatience_ms);
+  {
+    Statement check(database->handle, "PRAGMA quick_check(1)");
+    if (check.step() != SQLITE_ROW) return database->fault();
+    constexpr const char* kSound = "ok";
+    if (const std::string found = check.text(0); found != kSound)
+      return Error{Errc::bad_format, fmt::format("{}: is damaged ({}); {}", database->name, found, kMoveAway)};
+  }
   if (auto made = database->run("CREATE TABLE IF NOT EXISTS campaign (one INTEGER PRIMARY KEY, what TEXT);"
                                 "CREATE TABLE IF NOT EXISTS results (seed INTEGER PRIMARY KEY, result TEXT)");
       !made)

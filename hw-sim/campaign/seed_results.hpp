@@ -21,7 +21,8 @@ struct SeedLine {
 /// Results by seed, in one SQLite file that several programs may look at.
 class SeedResults {
  public:
-  /// Opens the file, or makes it. what: of what the results are, in words; a file of anything else is refused.
+  /// Opens the file, or makes it. what: of what the results are, in words; a file of anything else is refused, and so
+  /// is a damaged file.
   static Result<std::unique_ptr<SeedResults>> open(const std::filesystem::path& file, const std::string& what);
   ~SeedResults();
   SeedResults(const SeedResults&) = delete;

@@ -5,13 +5,18 @@
 #include <tbb/info.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <deque>
+#include <filesystem>
 #include <mutex>
+#include <system_error>
 #include <utility>
 
 #include "drivers/system/child_process.hpp"
 #include "drivers/system/condition.hpp"
+#include "drivers/system/program.hpp"
 #include "drivers/system/thread.hpp"
+#include "hw-sim/campaign/children_folder.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -36,15 +41,34 @@ std::vector<std::string> command_for(const SeedStudy& study, std::uint64_t seed)
   return out;
 }
 
+/// Whether a program may have crashed because there was no room for its temporary files.
+bool is_room_short() {
+  constexpr std::uintmax_t kEnough_bytes = std::uintmax_t{64} << 20U;
+  std::error_code failed;
+  const auto room = std::filesystem::space(std::filesystem::temp_directory_path(failed), failed);
+  return failed || room.available < kEnough_bytes;
+}
+
 /// What is wrong with how a seed's program ended; empty where its exit code is 0, or 3, which says that its verdict is
-/// bad. An error where something else ended the program, as the kernel does where memory runs short: such a seed has no
-/// result, and is tried again.
-Result<std::string> fault_of_end(const std::optional<int>& code) {
-  constexpr int kSignal = 128, kBadVerdict = 3;
+/// bad. An error where that says nothing of the seed: something else ended the program, as the kernel does where memory
+/// runs short, or the program says that it could not be run. Such a seed has no result, and is tried again.
+Result<std::string> fault_of_end(const std::optional<int>& code, const std::filesystem::path& log) {
+  constexpr int kSignal = 128;
+  constexpr int kUnusable = static_cast<int>(ExitCode::unusable_input);
+  constexpr int kBadVerdict = static_cast<int>(ExitCode::verdict_fail);
   if (!code) return std::string("it did not end in time");
+  if (*code == kUnusable) {
+    return Error{Errc::unreadable,
+                 fmt::format("its program could not be run, and ended with {}; {} says why", kUnusable, log.string())};
+  }
   if (*code == kSignal + SIGKILL || *code == kSignal + SIGTERM || *code == kSignal + SIGINT) {
     return Error{Errc::disconnected,
                  fmt::format("its program was ended by signal {}, as where memory is short", *code - kSignal)};
+  }
+  if (*code > kSignal && is_room_short()) {
+    return Error{Errc::io, fmt::format("its program crashed, with signal {}, where temporary files have no room; make "
+                                       "room there, or set TMPDIR to a folder with room",
+                                       *code - kSignal)};
   }
   if (*code > kSignal) return fmt::format("its program crashed, with signal {}", *code - kSignal);
   return *code == 0 || *code == kBadVerdict ? std::string() : fmt::format("its program ended with {}", *code);
@@ -58,7 +82,7 @@ Result<Outcome> run_one(const SeedStudy& study, const std::filesystem::path& log
   const Deadline deadline = Deadline::after(study.patience);
   const auto line = child->read_line(deadline);
   if (line && !*line) return Outcome{seed, study.kept(seed, Error{Errc::timeout, "none in time"})};
-  const auto fault = fault_of_end(child->wait(deadline));
+  const auto fault = fault_of_end(child->wait(deadline), log);
   if (!fault) return Outcome{seed, fault.error()};
   if (!line) {
     return Outcome{seed, study.kept(seed, Error{Errc::disconnected,
@@ -72,9 +96,11 @@ Result<Outcome> run_one(const SeedStudy& study, const std::filesystem::path& log
 /// What several threads work off. What they bring goes to the disk together, and nobody waits for that.
 class Work {
  public:
-  Work(const SeedStudy& study, std::deque<std::uint64_t> seeds, std::optional<Deadline> until, SeedResults& results,
-       const Said& said)
+  /// log: where to look why seeds give no result.
+  Work(const SeedStudy& study, std::filesystem::path log, std::deque<std::uint64_t> seeds,
+       std::optional<Deadline> until, SeedResults& results, const Said& said)
       : study_(study),
+        log_(std::move(log)),
         seeds_(std::move(seeds)),
         all_(seeds_.size()),
         until_(until),
@@ -139,14 +165,24 @@ class Work {
     for (const Outcome& one : outcomes) {
       if (one.line) {
         told_ += !study_.told.empty() && study_.tells(*one.line) ? 1 : 0;
-      } else if (without_++ == 0) {
-        first_without_ = fmt::format("seed {}: {}", one.seed, one.line.error().what);
+        without_in_row_ = 0;
+      } else {
+        count_without(one.seed, one.line.error());
       }
     }
     if (done_ / kTells == before / kTells && done_ != all_) return;
     said_(fmt::format("{} of {}{}{}", done_, all_,
                       study_.told.empty() ? "" : fmt::format(", {} {}", told_, study_.told),
                       without_ == 0 ? "" : fmt::format(", {} gave no result", without_)));
+  }
+  void count_without(std::uint64_t seed, const Error& why) {
+    constexpr std::size_t kMostInRow = 10;
+    const std::string words = fmt::format("seed {}: {}", seed, why.what);
+    if (without_++ == 0) first_without_ = words;
+    if (++without_in_row_ < kMostInRow) return;
+    fail_locked({why.code, fmt::format("{} seeds in a row gave no result, the last as {} ({} has what programs said); "
+                                       "mend that, and start the campaign again: it tries these seeds again",
+                                       kMostInRow, words, log_.string())});
   }
   void fail_locked(const Error& fault) {
     if (!fault_) fault_ = fault;
@@ -155,8 +191,9 @@ class Work {
   static constexpr std::size_t kTells = 20;
   mutable std::mutex mutex_;  // of what follows
   const SeedStudy& study_;
+  std::filesystem::path log_;
   std::deque<std::uint64_t> seeds_;
-  std::size_t all_, done_ = 0, told_ = 0, without_ = 0;
+  std::size_t all_, done_ = 0, told_ = 0, without_ = 0, without_in_row_ = 0;
   std::string first_without_;
   std::optional<Deadline> until_;
   SeedResults& results_;
@@ -193,12 +230,17 @@ std::vector<OwnedThread> at_work(int jobs, const SeedStudy& study, const std::fi
   return threads;
 }
 
-// Kinds of messages. To rank 0: ready for a first seed; the line of its seed, or why there is none. From rank 0: a
-// seed; the end.
+// Kinds of messages. To rank 0: ready for a first seed, with what the rank would run; the line of its seed, or why
+// there is none. From rank 0: a seed; the end.
 constexpr int kReady = 0, kLine = 1, kNone = 2, kSeed = 3, kEnd = 4;
 
-/// What rank 0 does beside its own seeds, until no other rank has one.
-Result<void> hand_out(Ranks& ranks, Duration patience, Work& work) {
+/// What a rank runs, which has to be the same in all ranks.
+std::string words_of(const SeedStudy& study, const SeedRun& run) {
+  return fmt::format("seeds {} to {} of {}", run.first_seed, run.last_seed, study.what);
+}
+
+/// What rank 0 does beside its own seeds, until no other rank has one. ours: what rank 0 runs.
+Result<void> hand_out(Ranks& ranks, Duration patience, const std::string& ours, Work& work) {
   struct Other {
     std::uint64_t seed = 0;
     std::optional<Deadline> answers;  // empty: it has no seed, and waits for the end
@@ -209,6 +251,12 @@ Result<void> hand_out(Ranks& ranks, Duration patience, Work& work) {
   const auto busy = [](const Other& other) { return other.answers.has_value(); };
   while (std::ranges::any_of(others, busy)) {
     if (const auto message = ranks.receive(Deadline::after(Duration::from_ms(100)))) {
+      if (message->kind == kReady && message->text != ours) {
+        return Error{Errc::bad_value,
+                     fmt::format("rank {} would run {}, where rank 0 runs {}; start all ranks by one command, with the "
+                                 "same birdseye-sim on each machine",
+                                 message->rank, message->text, ours)};
+      }
       Other& other = others[static_cast<std::size_t>(message->rank)];
       if (message->kind == kLine) work.take({other.seed, message->text});
       if (message->kind == kNone) work.take({other.seed, Error{Errc::disconnected, message->text}});
@@ -229,8 +277,9 @@ Result<void> hand_out(Ranks& ranks, Duration patience, Work& work) {
 }
 
 /// What the other ranks do.
-Result<void> work_for_rank_0(Ranks& ranks, const SeedStudy& study, const std::filesystem::path& log) {
-  ranks.send(0, kReady, "");
+Result<void> work_for_rank_0(Ranks& ranks, const SeedStudy& study, const SeedRun& run) {
+  const auto log = run.folder / fmt::format("campaign-{}.log", ranks.rank());
+  ranks.send(0, kReady, words_of(study, run));
   for (;;) {
     // The last seed of another rank may have begun just now.
     const auto message = ranks.receive(Deadline::after(study.patience + kMargin + kMargin));
@@ -252,13 +301,13 @@ Result<void> make_folder(const std::filesystem::path& folder) {
                                      failed.message())};
 }
 
-Result<std::unique_ptr<SeedResults>> run_all(const SeedStudy& study, const SeedRun& run, const Said& said,
-                                             Ranks* ranks) {
+Result<SeedsDone> run_all(const SeedStudy& study, const SeedRun& run, const Said& said, Ranks* ranks) {
   if (auto made = make_folder(run.folder); !made) return made.error();
+  const auto temporary = ChildrenFolder::make();
+  if (!temporary) return temporary.error();
   if (ranks != nullptr && ranks->rank() > 0) {
-    const auto log = run.folder / fmt::format("campaign-{}.log", ranks->rank());
-    if (auto worked = work_for_rank_0(*ranks, study, log); !worked) return worked.error();
-    return std::unique_ptr<SeedResults>();
+    if (auto worked = work_for_rank_0(*ranks, study, run); !worked) return worked.error();
+    return SeedsDone{};
   }
   if (ranks != nullptr && run.jobs > 0) {
     return Error{Errc::bad_value,
@@ -270,28 +319,31 @@ Result<std::unique_ptr<SeedResults>> run_all(const SeedStudy& study, const SeedR
   if (!results) return results.error();
   auto seeds = missing(**results, run);
   if (!seeds) return seeds.error();
-  Work work(study, *std::move(seeds), until, **results, said);
+  const auto log = run.folder / "campaign.log";
+  Work work(study, log, *std::move(seeds), until, **results, said);
   const int jobs = run.jobs > 0 ? run.jobs : ranks != nullptr ? 1 : tbb::info::default_concurrency();
-  auto threads = at_work(jobs, study, run.folder / "campaign.log", work);
+  auto threads = at_work(jobs, study, log, work);
   if (ranks != nullptr) {
-    if (auto handed = hand_out(*ranks, study.patience, work); !handed) work.fail(handed.error());
+    if (auto handed = hand_out(*ranks, study.patience, words_of(study, run), work); !handed) work.fail(handed.error());
   }
   for (OwnedThread& thread : threads) thread.join();
   if (ranks != nullptr && !work.fault()) {
     for (int other = 1; other < ranks->size(); ++other) ranks->send(other, kEnd, "");
     ranks->leave();
   }
-  if (auto complete = work.complete(); !complete) return complete.error();
-  return results;
+  auto complete = work.complete();
+  return SeedsDone{*std::move(results), std::move(complete)};
 }
 
 }  // namespace
 
-Result<std::unique_ptr<SeedResults>> run_seeds(const SeedStudy& study, const SeedRun& run, const Said& said,
-                                               Ranks* ranks) {
-  auto results = run_all(study, run, said, ranks);
-  if (!results && ranks != nullptr && !ranks->left()) ranks->give_up(results.error());
-  return results;
+Result<SeedsDone> run_seeds(const SeedStudy& study, const SeedRun& run, const Said& said, Ranks* ranks) {
+  auto done = run_all(study, run, said, ranks);
+  if (ranks == nullptr || ranks->left()) return done;
+  // give_up() does not come back.
+  if (!done) ranks->give_up(done.error());
+  if (!done->all) ranks->give_up(done->all.error());
+  return done;
 }
 
 }  // namespace birdseye::hw_sim

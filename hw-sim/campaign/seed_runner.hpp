@@ -36,15 +36,20 @@ struct SeedRun {
   std::optional<double> at_most_s;  ///< none begins after so long; empty: all seeds are run
 };
 
+/// What came of a run.
+struct SeedsDone {
+  std::unique_ptr<SeedResults> results;  ///< all that the folder has; nullptr in every rank but rank 0
+  Result<void> all;                      ///< an error: some seeds gave nothing to keep, or the run was stopped
+};
+
 /// A line of progress.
 using Said = std::function<void(const std::string&)>;
 
 /// Runs each seed that the folder has no result of, in a process of its own, handed out by need. said: told from time
-/// to time how far it is. One that was ended goes on where it is started again. Gives all that the folder has then; an
-/// error where a seed gave nothing to keep, once all were tried.
-/// ranks: all of them call this, and none uses MPI afterwards. Rank 0 hands out, has the results, and works itself as
-/// the others do; they get nullptr. What goes wrong in one of them ends all.
-Result<std::unique_ptr<SeedResults>> run_seeds(const SeedStudy& study, const SeedRun& run, const Said& said,
-                                               Ranks* ranks = nullptr);
+/// to time how far it is. A run that was ended goes on where it is started again. A seed that gives nothing to keep is
+/// tried again by the next run; ten such seeds in a row stop this one.
+/// ranks: all of them call this, and none uses MPI afterwards. Rank 0 hands out, has the results, works itself as the
+/// others do, and refuses a rank that would run anything else. What goes wrong in one of them ends all.
+Result<SeedsDone> run_seeds(const SeedStudy& study, const SeedRun& run, const Said& said, Ranks* ranks = nullptr);
 
 }  // namespace birdseye::hw_sim

@@ -170,6 +170,11 @@ class Reader {
   }
 
   std::vector<double> times_of(const toml::value& entry) {
+    if (entry.contains("times") && !entry.contains("between_s")) {
+      fail(entry.at("times"),
+           "times: goes with between_s = [from, to]; give that in place of at_s, or leave out times");
+      return {};
+    }
     const auto at_s = number(entry, "at_s", 0, kLatestS);
     if (at_s && !entry.contains("between_s")) return {*at_s};
     if (entry.contains("at_s") == entry.contains("between_s")) {
@@ -214,7 +219,7 @@ class Reader {
                                 fmt::join(known, ", ")));
       }
     }
-    fault.for_s = number(entry, "for_s", 1e-6, kLatestS);
+    fault.for_s = number(entry, "for_s", spec->least_for_s, kLatestS);
     if (!entry.contains("for_s") && spec->without_end == WithoutEnd::refused) {
       fail(entry, fmt::format("{}: needs for_s, how long it lasts", fault_name(spec->kind)));
     }

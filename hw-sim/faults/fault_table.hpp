@@ -22,6 +22,7 @@ struct FaultSpec {
   bool of_tracker, of_camera, of_world, of_program;
   WithoutEnd without_end;
   std::span<const ParameterSpec> parameters;
+  double least_for_s = 1e-6;  ///< what is over sooner, nobody need see
 };
 
 std::span<const FaultSpec> fault_table();

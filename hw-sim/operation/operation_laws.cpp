@@ -332,16 +332,20 @@ void OperationLaws::judge(const Span& span, double until_s) {
   ++of_fault.judged;
   if (!signs.counters.empty() || !signs.words.empty() || signs.half_size) {
     const double took_s = span.named_s.value_or(until_s) - span.begins_s;
-    figures_.slowest_named_s = std::max(figures_.slowest_named_s, took_s);
-    of_fault.slowest_named_s = std::max(of_fault.slowest_named_s, took_s);
+    if (span.named_s) {
+      figures_.slowest_named_s = std::max(figures_.slowest_named_s, took_s);
+      of_fault.slowest_named_s = std::max(of_fault.slowest_named_s, took_s);
+    }
     if (took_s > kNamedWithin_s + signs.strikes_within_s)
       break_law(span.begins_s, "named", fmt::format("{} was {}", name, span.named_s ? "named late" : "never named"));
   }
   if (span.ends_s + kAlone_s >= until_s) return;
   for (const auto& [what, again_s] : {std::pair{"poses", span.poses_again_s}, {"frames", span.frames_again_s}}) {
     const double took_s = again_s.value_or(until_s) - span.ends_s;
-    figures_.slowest_over_s = std::max(figures_.slowest_over_s, took_s);
-    of_fault.slowest_over_s = std::max(of_fault.slowest_over_s, again_s.value_or(until_s) - span.own_end_s);
+    if (again_s) {
+      figures_.slowest_over_s = std::max(figures_.slowest_over_s, took_s);
+      of_fault.slowest_over_s = std::max(of_fault.slowest_over_s, *again_s - span.own_end_s);
+    }
     if (took_s > kOverWithin_s)
       break_law(span.ends_s, "over", fmt::format("{}: {} are there {:.1f} s after its end", name, what, took_s));
   }

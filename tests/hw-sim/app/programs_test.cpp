@@ -134,6 +134,27 @@ TEST(Programs, NoOutputIsAnInput) {
   EXPECT_EQ(contents_of(slice), "a patient's");
 }
 
+TEST(Programs, AnOperationIsNotRunForFilesThatCannotBeWritten) {
+  const Scratch scratch;
+  const std::string log = (scratch / "log").string(), nowhere = (scratch / "none/log").string();
+  for (const std::string option : {"--log ", "--faults "}) {
+    expect_refused("birdseye-sim", "operation --minutes 0.5 " + option + nowhere, {nowhere + ": cannot be written"});
+    expect_refused("birdseye-sim", "operation --minutes 0.5 " + option + scratch.path().string(),
+                   {scratch.path().string() + ": is a folder"});
+  }
+  expect_refused("birdseye-sim",
+                 "operation --minutes 0.5 --log " + log + " --faults " + scratch.path().string() + "/./log",
+                 {log + ": is named by --log and by --faults"}, log);
+}
+
+/// As on a disk that is full.
+TEST(Programs, WhatCameOfAnOperationIsToldBeforeItsFilesAreWritten) {
+  const auto told = run("birdseye-sim", "operation --minutes 0.5 --log /dev/full");
+  EXPECT_EQ(told.code, 2) << told.output;
+  EXPECT_NE(told.output.find("seed 1: 0.5 minutes"), std::string::npos) << told.output;
+  EXPECT_NE(told.output.find("/dev/full: cannot be written"), std::string::npos) << told.output;
+}
+
 TEST(Programs, WhatIsTheUsersOwnIsNotWrittenOver) {
   for (const std::string command : {"phantom", "case"}) {
     const Scratch scratch;

@@ -17,6 +17,7 @@
 #include "hw-sim/campaign/campaign.hpp"
 #include "hw-sim/campaign/ranks.hpp"
 #include "hw-sim/campaign/seed_results.hpp"
+#include "tests/hw-sim/campaign/variable.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::hw_sim {
@@ -67,6 +68,7 @@ class CampaignByRanks : public ::testing::Test {
   }
 
   const Scratch scratch_;
+  const SetVariable temporary_{"TMPDIR", scratch_.path().string()};  // ranks that are killed leave files there
 };
 
 TEST_F(CampaignByRanks, GivesTheSameBySeedWhateverTheirNumber) {
@@ -125,21 +127,34 @@ TEST_F(CampaignByRanks, RefuseWhatCannotBeDoneInWords) {
       << contents_of(log());
 }
 
-/// A variable of the environment for a while.
-class Set {
- public:
-  Set(const char* name, const char* value) : name_(name) { ::setenv(name, value, 1); }
-  ~Set() { ::unsetenv(name_); }
-  Set(const Set&) = delete;
-  Set& operator=(const Set&) = delete;
-
- private:
-  const char* name_;
-};
+/// As where a host has another version, or another command was meant.
+TEST_F(CampaignByRanks, RefuseOneThatWouldRunAnythingElse) {
+  const auto and_another = [this](const Words& one, const Words& other) {
+    Words all = one;
+    all.insert(all.end(), {":", "-n", "1", beside_us("birdseye-sim"), "campaign"});
+    all.insert(all.end(), other.begin(), other.end());
+    EXPECT_EQ(campaign(1, all), 2);
+    return contents_of(log());
+  };
+  const Words out{"--out", folder(2)};
+  const auto with = [&](Words words) {
+    words.insert(words.begin(), out.begin(), out.end());
+    return words;
+  };
+  const std::string range =
+      and_another(with({"--seeds", "1:2", "--", "echo", "{}"}), with({"--seeds", "1:3", "--", "echo", "{}"}));
+  EXPECT_NE(range.find("rank 1 would run seeds 1 to 3 of echo {}, where rank 0 runs seeds 1 to 2 of echo {}"),
+            std::string::npos)
+      << range;
+  const std::string length =
+      and_another(with({"--seeds", "1:2", "--minutes", "0.5"}), with({"--seeds", "1:2", "--minutes", "0.6"}));
+  EXPECT_NE(length.find("rank 1 would run seeds 1 to 2 of operations of 0.6 minutes, build "), std::string::npos)
+      << length;
+}
 
 TEST(Ranks, AreNoneForAProgramAlone) {
   for (const char* const variable : {"PMI_SIZE", "OMPI_COMM_WORLD_SIZE"}) {
-    const Set one(variable, "1");
+    const SetVariable one(variable, "1");
     const auto joined = Ranks::join();
     ASSERT_TRUE(joined) << joined.error().what;
     EXPECT_EQ(*joined, nullptr) << variable;
@@ -147,7 +162,7 @@ TEST(Ranks, AreNoneForAProgramAlone) {
 }
 
 TEST(Ranks, AreRefusedFromAnythingButOpenMpi) {
-  const Set another("PMI_SIZE", "4");
+  const SetVariable another("PMI_SIZE", "4");
   const auto joined = Ranks::join();
   ASSERT_FALSE(joined);
   EXPECT_EQ(joined.error().code, Errc::unsupported);

@@ -75,6 +75,32 @@ at_s = 1
   }
 }
 
+/// What is over before anybody could tell it, and what strikes nothing.
+TEST(FaultScript, RefusesWhatNobodyCouldTell) {
+  const auto with = [](const std::string& name, const std::string& more) {
+    return problem("[[fault]]\nname = \"" + name + "\"\nat_s = 15\n" + more, Instruments::with_programs);
+  };
+  for (const char* const name :
+       {"appliance_restart", "window_restart", "scope_exchanged", "appliance_power_cut", "power_cut", "size_change"}) {
+    EXPECT_NE(with(name, "for_s = 0.09\n").find("line 4: for_s: needs a number of 0.1"), std::string::npos) << name;
+    EXPECT_EQ(with(name, "for_s = 0.1\n"), "");
+  }
+  EXPECT_NE(with("silence", "for_s = 0.3\n").find("for_s: needs a number of 0.5"), std::string::npos);
+  EXPECT_EQ(with("silence", "for_s = 0.5\n"), "");
+  for (const char* const name : {"drop_byte", "lost_record", "drop_frames", "sequence_gap", "garbage", "torn_frame"}) {
+    EXPECT_NE(with(name, "for_s = 1\nchance = 0\n").find("chance: needs a number of 0.001 to 1"), std::string::npos)
+        << name;
+  }
+  EXPECT_NE(with("appliance_disk_late", "for_s = 5\nms = 3255\n").find("ms: needs a number of 0 to 1000"),
+            std::string::npos);
+}
+
+TEST(FaultScript, RefusesTimesWhereItSaysWhenAFaultBefalls) {
+  const std::string why = problem("[[fault]]\nname = \"drop_byte\"\nat_s = 1\ntimes = 5\n");
+  EXPECT_NE(why.find("line 4: times: goes with between_s"), std::string::npos) << why;
+  EXPECT_EQ(problem("[[fault]]\nname = \"drop_byte\"\nbetween_s = [1, 2]\ntimes = 5\n"), "");
+}
+
 TEST(FaultScript, OfANameThatThereIsNotItNamesThoseThatAreAlike) {
   const std::string why = problem("[[fault]]\nname = \"transmiter_bump\"\nat_s = 1\n");
   EXPECT_NE(why.find("no such fault; alike are transmitter_bumped"), std::string::npos) << why;
