@@ -240,11 +240,11 @@ TEST(UnreadForm, ANameOfAMetaImageIsSpeltAsItsReaderSpellsIt) {
     const std::string right(line), name = right.substr(0, right.find(' '));
     ASSERT_EQ(refusal_of(scratch, right, right), "");
     EXPECT_EQ(refusal_of(scratch, right, "\n" + right + "\t"), "") << "blanks and blank lines do not matter";
-    std::string small = right, first = right, colon = right, both = right;
+    const std::string value = right.substr(name.size() + 2);
+    std::string small = right, colon = right;
     small[0] = static_cast<char>(small[0] - 'A' + 'a');
-    first.replace(0, name.size(), lower_case(name));
-    colon.replace(name.size() + 1, 1, ":");
-    both.replace(name.size() + 1, 1, ":=");
+    colon[name.size() + 1] = ':';
+    const std::string first = lower_case(name) + " =" + value, both = name + " :=" + value;
     for (const std::string& wrong : {small, first, colon, both}) {
       for (const std::string& instead : {wrong, right + "\n" + wrong, wrong + "\n" + right}) {
         const std::string told = refusal_of(scratch, right, instead);
