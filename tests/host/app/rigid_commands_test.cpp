@@ -406,7 +406,7 @@ TEST(RigidCommands, RefuseBadInputInOneLine) {
   const std::string markers = "volume markers " + (scratch / "none").string() + " --out " + out + " ";
   for (const auto& [arguments, words] :
        {std::pair{fiducials + "--surface " + points, "--surface-points"},
-        {fiducials + "--surface " + points + " --surface-points " + points, "no triangles"},
+        {fiducials + "--surface " + points + " --surface-points " + points, "is no STL, PLY, OBJ or VTK by its name"},
         {fiducials + "--surface " + (scratch / "no.ply").string() + " --surface-points " + points, "no such file"},
         {fiducials + "--targets " + (scratch / "no.txt").string(), "no such file"},
         {fiducials + "--volume " + (scratch / "no.mha").string(), "no such file"},
