@@ -181,7 +181,7 @@ std::string other_space(const std::string& remarks) {
     const bool begins = at == 0 || !is_of_a_word(remarks[at - 1]);
     at += kSays.size();
     const auto first = remarks.begin() + static_cast<std::ptrdiff_t>(at);
-    const std::string space(first, std::find_if_not(first, remarks.end(), is_of_a_word));
+    std::string space(first, std::find_if_not(first, remarks.end(), is_of_a_word));
     const bool is_lps = lower_case(space) == "lps" || lower_case(space) == "left-posterior-superior";
     if (begins && !space.empty() && !is_lps) return space;
   }
