@@ -14,7 +14,7 @@ namespace birdseye::device {
 namespace {
 
 Error without_key(const WireConfig& wire, const Error& error) {
-  return error.with_context(fmt::format("[wire] bind {}: TLS needs this machine's key", wire.bind));
+  return error.with_context(fmt::format("[wire] bind {}: {}", wire.bind, wire::kNeedsKey));
 }
 
 Result<void> check_identity() {

@@ -15,6 +15,10 @@ using SSL_CTX = struct ssl_ctx_st;  // as OpenSSL has it, for whoever includes t
 
 namespace birdseye::wire {
 
+/// Whatever speaks against this machine's own key or its list of known ones is told with these words, by which others
+/// know it again.
+inline constexpr const char* kNeedsKey = "TLS needs this machine's key";
+
 /// A certificate as PEM; empty: there is none.
 std::string pem_of(X509* certificate);
 

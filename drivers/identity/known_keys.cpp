@@ -4,6 +4,8 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <sstream>
 #include <string_view>
 #include <system_error>
@@ -57,14 +59,14 @@ Result<KnownKeys> KnownKeys::read(const fs::path& folder, const std::optional<Ma
     if (own) out.machines_.insert(out.machines_.begin(), Machine{out.free_name(own->name), own->key});
     return out;
   };
-  std::error_code ignored;
-  if (!fs::exists(out.file_, ignored)) return with_own();
-  struct stat status {};
-  const bool there = ::stat(out.file_.c_str(), &status) == 0;
-  if (there) {
-    if (const auto checked = check_owner(out.file_, status); !checked) return checked.error();
+  struct stat status = {};
+  if (::stat(out.file_.c_str(), &status) != 0) {
+    if (errno == ENOENT || errno == ENOTDIR) return with_own();
+    return Error{Errc::unreadable, fmt::format("{}: cannot be read ({}); see whose file and folder it is, and its disk",
+                                               out.file_.string(), std::strerror(errno))};
   }
-  if (there && (status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
+  if (const auto checked = check_owner(out.file_, status); !checked) return checked.error();
+  if ((status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
     return Error{Errc::bad_value, fmt::format("{}: others than its owner may say in it which machines are known: chmod "
                                               "644 {}, and look whether each line is yours",
                                               out.file_.string(), out.file_.string())};

@@ -1,8 +1,8 @@
 #include "host/app/input_files.hpp"
 
+#include <algorithm>
 #include <exception>
 #include <fstream>
-#include <regex>
 #include <sstream>
 #include <string_view>
 #include <system_error>
@@ -39,6 +39,20 @@ void add_beside(const fs::path& header, std::string_view name, std::vector<fs::p
     out.push_back(std::move(beside));
 }
 
+/// A name in which each number, as %03d, is any text.
+std::string with_stars(const std::string& name) {
+  std::string out;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    if (name[i] != '%') {
+      out += name[i];
+      continue;
+    }
+    i = std::min(name.find_first_not_of("0123456789", i + 1), name.size());  // where the number's letter is
+    out += '*';
+  }
+  return out;
+}
+
 /// Any file beside a header that one of its lines names, alone or as a field's value, and the other file of a NIfTI
 /// pair. A name with a number in it stands for many: "data file: ct%03d.raw 1 100 1".
 void add_voxel_files(const fs::path& header, std::vector<fs::path>& out) {
@@ -60,8 +74,7 @@ void add_voxel_files(const fs::path& header, std::vector<fs::path>& out) {
     add_beside(header, value, out);
     const std::string field = lower_case(std::string(without_blanks(std::string_view(line).substr(0, sign))));
     if (!field.ends_with("file") || value.find('%') == std::string::npos) continue;
-    const std::regex number("%[0-9]*[a-z]");
-    add_matching(folder_of(header) / std::regex_replace(value.substr(0, value.find(' ')), number, "*"), out);
+    add_matching(folder_of(header) / with_stars(value.substr(0, value.find(' '))), out);
     return;  // the last field that names any
   }
 }

@@ -150,7 +150,7 @@ Verdict judge(const RecordingWriter& writer, const RecordOptions& options, const
   }
   if (ending.left > 0)
     verdict.add(Grade::marginal,
-                fmt::format("{} frames, poses and other messages that had come could not be written", ending.left));
+                fmt::format("{} frames, poses and other messages that had come were not written", ending.left));
   if (figures.frames == 0) verdict.add(Grade::marginal, "no frames came");
   if (figures.measurements == 0) verdict.add(Grade::marginal, "no poses came");
   const double all = static_cast<double>(figures.frames) + static_cast<double>(figures.frames_missing);

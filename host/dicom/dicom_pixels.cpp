@@ -202,6 +202,7 @@ std::string DicomPixels::Open::wrong_size(const DicomSlice& slice) const {
                        slice.columns, slice.rows);
   };
   const bool together = frames > 1 && sequence->card() - 1 != static_cast<unsigned long>(frames);
+  if (syntax == EXS_RLELossless && together) return {};  // nothing says where a frame ends
   // Frames of several fragments are of one size, which the first of all says.
   const auto first = together ? item_bytes(*sequence, 1) : std::span<const std::uint8_t>();
   const auto stream = together ? std::vector(first.begin(), first.end()) : frame_bytes(*sequence, slice.frame, frames);

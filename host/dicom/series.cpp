@@ -137,10 +137,12 @@ bool are_alike(const std::filesystem::path& a, const std::filesystem::path& b) {
   return of_a.eof() && of_b.eof();
 }
 
-/// Whether two slices lie at the same place, as large.
+/// Whether two slices lie at the same place, as large. A program that copies files may write fewer digits.
 bool lie_alike(const DicomSlice& a, const DicomSlice& b) {
-  return a.columns == b.columns && a.rows == b.rows && a.position_mm == b.position_mm && a.row == b.row &&
-         a.column == b.column && a.spacing_mm == b.spacing_mm;
+  constexpr double kNear_mm = 1e-2, kNear = 1e-4;  ///< of places; of directions, and of a pixel's size in mm
+  return a.columns == b.columns && a.rows == b.rows && (a.position_mm - b.position_mm).norm() < kNear_mm &&
+         (a.row - b.row).norm() < kNear && (a.column - b.column).norm() < kNear &&
+         (a.spacing_mm - b.spacing_mm).norm() < kNear;
 }
 
 /// The Hounsfield units of all frames of a file; none where one cannot be decoded.

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <fstream>
 #include <sstream>
 
+#include "device/wire/tls.hpp"
 #include "drivers/system/local_programs.hpp"
 #include "host/doctor/configured.hpp"
 #include "host/doctor/program_output.hpp"
@@ -117,9 +119,22 @@ std::vector<Check> check_config(const Machine& machine, const fs::path& config) 
     return checks;
   }
   std::vector<Check> checks;
-  for (const std::string& line : checked->lines)
-    checks.push_back(
-        {kService, "configuration", CheckState::bad, line, "docs/manual/birdseyed.md says what may be in it"});
+  for (const std::string& line : checked->lines) {
+    // Those are the keys of whoever asks, and not of the service's user.
+    if (line.find(wire::kNeedsKey) != std::string::npos) {
+      checks.push_back({kService, "keys", CheckState::not_known, line,
+                        fmt::format("ask as the service's user: sudo -u birdseye env STATE_DIRECTORY=/var/lib/birdseye "
+                                    "birdseyed --config {} --check",
+                                    name)});
+    } else {
+      checks.push_back(
+          {kService, "configuration", CheckState::bad, line, "docs/manual/birdseyed.md says what may be in it"});
+    }
+  }
+  if (!checks.empty() && std::ranges::all_of(checks, [](const Check& one) { return one.name == "keys"; })) {
+    const std::vector<Check> named = check_configured(machine, config);
+    checks.insert(checks.end(), named.begin(), named.end());
+  }
   if (checks.empty()) {
     checks.push_back({kService, name, CheckState::bad, fmt::format("birdseyed --check ends with {}", checked->code),
                       "install birdseyed anew"});

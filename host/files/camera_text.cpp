@@ -80,9 +80,9 @@ Result<void> refuse_other_models(const Said& said) {
   if (fisheye != "0" && fisheye != "false") return unknown_model("fisheye_model", fisheye);
   if (const auto xi = said("xi")) return unknown_model("xi (of an omnidirectional camera)", *xi);
   for (const char* key : {"distortion_model", "camera_model"}) {
-    const std::string model = lower_case(said(key).value_or(""));
-    if (!model.empty() && model != "plumb_bob" && model != "radtan" && model != "rational_polynomial" &&
-        model != "pinhole") {
+    const std::string model = said(key).value_or(""), word = lower_case(model);
+    if (!word.empty() && word != "plumb_bob" && word != "radtan" && word != "rational_polynomial" &&
+        word != "pinhole" && word != "none") {
       return unknown_model(key, model);
     }
   }

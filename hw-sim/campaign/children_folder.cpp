@@ -18,7 +18,9 @@ namespace birdseye::hw_sim {
 namespace {
 
 constexpr const char* kVariable = "TMPDIR";
-constexpr std::string_view kBegins = "birdseye-campaign-";
+constexpr std::string_view kBegins = "birdseye-campaign-", kDrawn = "XXXXXX";
+/// A file in each such folder, which nobody else's folder of such a name has.
+constexpr const char* kMark = ".temporary-files-of-a-campaign";
 
 /// The lock of a campaign's folder; empty where a program holds it that still runs, or where the folder is another
 /// user's. Programs that this one starts inherit the lock: the folder stays for as long as one of them runs.
@@ -35,8 +37,11 @@ void remove_left(const std::filesystem::path& within) {
   std::error_code failed;
   for (std::filesystem::directory_iterator entry(within, failed), end; !failed && entry != end;
        entry.increment(failed)) {
-    if (!entry->path().filename().string().starts_with(kBegins)) continue;
+    const std::string name = entry->path().filename().string();
     std::error_code ignored;
+    if (!name.starts_with(kBegins) || name.size() != kBegins.size() + kDrawn.size() ||
+        !std::filesystem::is_regular_file(std::filesystem::symlink_status(entry->path() / kMark, ignored)))
+      continue;
     if (const UniqueFd lock = lock_of(entry->path())) std::filesystem::remove_all(entry->path(), ignored);
   }
 }
@@ -55,15 +60,18 @@ Result<std::unique_ptr<ChildrenFolder>> ChildrenFolder::make() {
   remove_left(within);
   constexpr int kTries = 10;
   for (int i = 0; i < kTries; ++i) {
-    std::string path = (within / kBegins).string() + "XXXXXX";
+    std::string path = fmt::format("{}{}", (within / kBegins).string(), kDrawn);
     if (::mkdtemp(path.data()) == nullptr) {
       return Error{Errc::unreadable,
                    fmt::format("{}: cannot be made ({}); set TMPDIR to a folder with room", path, ::strerror(errno))};
     }
-    // Another campaign that begins just now may have taken the folder, not locked yet, for one that was left.
+    // Marked once it is locked: another campaign that begins just now takes it for none that was left.
     UniqueFd lock = lock_of(path);
-    if (lock && std::filesystem::exists(path, failed))
-      return std::unique_ptr<ChildrenFolder>(new ChildrenFolder(path, std::move(lock)));
+    const UniqueFd mark(
+        ::open((std::filesystem::path(path) / kMark).c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600));
+    if (lock && mark) return std::unique_ptr<ChildrenFolder>(new ChildrenFolder(path, std::move(lock)));
+    if (mark) std::filesystem::remove(std::filesystem::path(path) / kMark, failed);
+    ::rmdir(path.c_str());
   }
   return Error{Errc::io, fmt::format("{}: no folder there can be locked; set TMPDIR to a folder of this machine's disk",
                                      within.string())};

@@ -43,7 +43,7 @@ std::vector<std::string> command_for(const SeedStudy& study, std::uint64_t seed)
 
 /// Whether a program may have crashed because there was no room for its temporary files.
 bool is_room_short() {
-  constexpr std::uintmax_t kEnough_bytes = std::uintmax_t{64} << 20U;
+  constexpr std::uintmax_t kEnough_bytes = std::uintmax_t{1} << 20U;
   std::error_code failed;
   const auto room = std::filesystem::space(std::filesystem::temp_directory_path(failed), failed);
   return failed || room.available < kEnough_bytes;
@@ -204,7 +204,8 @@ class Work {
   OwnedThread entering_;  // last: it uses all of the above
 };
 
-/// The missing ones.
+/// The missing ones: first those beyond all that are known, then the gaps, whose seeds may have given no result before
+/// and stop a campaign that comes to ten of them.
 Result<std::deque<std::uint64_t>> missing(const SeedResults& results, const SeedRun& run) {
   const auto known = results.seeds();
   if (!known) return known.error();
@@ -212,6 +213,7 @@ Result<std::deque<std::uint64_t>> missing(const SeedResults& results, const Seed
   for (std::uint64_t seed = run.first_seed; seed <= run.last_seed; ++seed) {
     if (!known->contains(seed)) out.push_back(seed);
   }
+  if (!known->empty()) std::ranges::rotate(out, std::ranges::upper_bound(out, *known->rbegin()));
   return out;
 }
 

@@ -140,9 +140,16 @@ void OperationLaws::expect_slips() {
       continue;
     std::vector<double> begins_s{fault.at_s};
     if (fault.for_s) begins_s.push_back(fault.at_s + *fault.for_s);
-    for (const double begin_s : begins_s)
-      if (is_quiet(span, begin_s)) slips.emplace_back(begin_s, begin_s + takes_s(fault));
+    for (const double begin_s : begins_s) {
+      if (is_quiet(span, begin_s)) {
+        slips.emplace_back(begin_s, begin_s + takes_s(fault));
+      } else {
+        // What hides it may take the poses away by which it would be seen before the frames are drawn.
+        moves_.push_back({begin_s, begin_s + takes_s(fault), false});
+      }
+    }
   }
+  std::ranges::sort(moves_, {}, &Move::begins_s);
   std::ranges::sort(slips);
   for (const auto& [begin_s, end_s] : slips) doubts_.come_off(begin_s, end_s);
 }

@@ -173,6 +173,13 @@ bool is_of_a_word(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_';
 }
 
+/// Whether a word names the axes of a frame, as "RAS" or "left-anterior-superior".
+bool names_axes(const std::string& word) {
+  const auto has_one_of = [&word](const char* letters) { return word.find_first_of(letters) != std::string::npos; };
+  if (word.size() == 3) return has_one_of("rl") && has_one_of("ap") && has_one_of("si");
+  return word.find("anterior") != std::string::npos || word.find("posterior") != std::string::npos;
+}
+
 /// The frame of a surface that 3D Slicer wrote, as "RAS" of the remark "SPACE=RAS", where it is not LPS. Empty where it
 /// is, or where the file says none.
 std::string other_space(const std::string& remarks) {
@@ -182,8 +189,8 @@ std::string other_space(const std::string& remarks) {
     at += kSays.size();
     const auto first = remarks.begin() + static_cast<std::ptrdiff_t>(at);
     std::string space(first, std::find_if_not(first, remarks.end(), is_of_a_word));
-    const bool is_lps = lower_case(space) == "lps" || lower_case(space) == "left-posterior-superior";
-    if (begins && !space.empty() && !is_lps) return space;
+    const std::string word = lower_case(space);
+    if (begins && names_axes(word) && word != "lps" && word != "left-posterior-superior") return space;
   }
   return {};
 }

@@ -237,6 +237,14 @@ TEST_F(FollowedFile, WhoeverMayWriteItLetsNobodyIn) {
   EXPECT_NE(keys_->fault().find("chmod 644"), std::string::npos) << keys_->fault();
 }
 
+/// A file that cannot be read is not one that is not there.
+TEST_F(FollowedFile, OneThatCannotBeReachedPutsNobodyOutAndIsTold) {
+  fs::remove(folder_ / "known");
+  fs::create_symlink("known", folder_ / "known");  // to itself
+  EXPECT_EQ(keys_->name_of(key_of(2)), "cart-1");
+  EXPECT_NE(keys_->fault().find("known: cannot be read"), std::string::npos) << keys_->fault();
+}
+
 TEST_F(FollowedFile, IsRefusedWhereItCannotBeUsedToBeginWith) {
   say("theatre-3 KEY\n");
   EXPECT_FALSE(FollowedKeys::open(folder_.path(), kOwn));

@@ -325,6 +325,20 @@ TEST(Campaign, StopsWhereTenSeedsInARowGiveNoResult) {
   EXPECT_LT(contents_of(scratch / "ran").size(), 1000U);
 }
 
+/// Those that gave no result before come last: they stop a campaign, and no seed is kept from its turn.
+TEST(Campaign, TriesNewSeedsBeforeThoseThatGaveNoResult) {
+  const Scratch scratch;
+  const std::string every_third = "test $(({} % 3)) != 0 && echo {}";
+  SeedRun run = up_to(scratch, 36);
+  run.jobs = 1;
+  ASSERT_TRUE(run_seeds(by_shell(every_third), run, hear_nothing));
+  run.last_seed = 60;
+  const auto done = run_seeds(by_shell(every_third), run, hear_nothing);
+  ASSERT_TRUE(done) << done.error().what;
+  EXPECT_NE(why_not_all(*done).find("10 seeds in a row gave no result"), std::string::npos) << why_not_all(*done);
+  EXPECT_EQ(done->results->seeds()->size(), 40U);
+}
+
 /// Nine, then one that gives a result, then nine more.
 TEST(Campaign, GoesOnWhereFewerInARowGiveNoResult) {
   const Scratch scratch;
@@ -356,6 +370,10 @@ TEST(Campaign, RemovesWhatADeadCampaignLeftAndNothingOfALivingOne) {
   const Scratch scratch;
   const SetVariable set("TMPDIR", scratch.path().string());
   std::filesystem::create_directories(scratch / "birdseye-campaign-dead00/birdseye-abcdef");
+  (void)scratch.file("birdseye-campaign-dead00/.temporary-files-of-a-campaign", "");
+  // Somebody's own, by two names that are like a campaign's.
+  std::filesystem::create_directories(scratch / "birdseye-campaign-mine00");
+  std::filesystem::create_directories(scratch / "birdseye-campaign-results/birdseye-abcdef");
   std::filesystem::create_directory(scratch / "birdseye-abcdef");  // nobody says whose it is
   std::filesystem::path path;
   {
@@ -363,6 +381,8 @@ TEST(Campaign, RemovesWhatADeadCampaignLeftAndNothingOfALivingOne) {
     ASSERT_TRUE(living) << living.error().what;
     path = (*living)->path();
     EXPECT_FALSE(std::filesystem::exists(scratch / "birdseye-campaign-dead00"));
+    EXPECT_TRUE(std::filesystem::exists(scratch / "birdseye-campaign-mine00"));
+    EXPECT_TRUE(std::filesystem::exists(scratch / "birdseye-campaign-results/birdseye-abcdef"));
     const SetVariable again("TMPDIR", scratch.path().string());
     const auto other = ChildrenFolder::make();
     ASSERT_TRUE(other) << other.error().what;

@@ -199,6 +199,17 @@ INSTANTIATE_TEST_SUITE_P(Operation, MendedSeedOfPrograms,
                          ::testing::Values(106, 168, 229, 260, 1307, 1477, 66263737, 66263751, 206351423),
                          [](const auto& of) { return std::to_string(of.param); });
 
+/// A law was wrong: the reference slipped, and 70 ms later the tracker lost its power, and with it the poses by which
+/// the slip would have been seen before the frames of these 70 ms were drawn: three pictures were 11.8 mm off.
+TEST(Operation, MendedSeed95012033SlipsWhereNoPoseComesToTellOfIt) {
+  FaultScript script;
+  script.tracker = {usual(FaultKind::drift_step, 100.086, 8.655, {{"ppm", 2844.589}}),
+                    usual(FaultKind::power_cycle, 131.741, 1.595, {{"boot_s", 0.893}})};
+  script.world = {usual(FaultKind::reference_moved, 102.331, 29.347, {{"deg", 10}, {"mm", 21.13}, {"over_s", 0.1}})};
+  const OperationOutcome out = operate({.seed = 95012033, .minutes = 2.4, .faults = script, .reference = true});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+}
+
 /// A law was wrong: one byte lost and another's bit turned over made a record of pieces of two, 5.2 mm off where 4.0
 /// were allowed. A hand might have moved so.
 TEST(Operation, MendedSeed2021HasARecordOfPiecesOfTwo) {
