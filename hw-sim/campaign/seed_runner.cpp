@@ -213,7 +213,7 @@ Result<std::deque<std::uint64_t>> missing(const SeedResults& results, const Seed
   for (std::uint64_t seed = run.first_seed; seed <= run.last_seed; ++seed) {
     if (!known->contains(seed)) out.push_back(seed);
   }
-  if (!known->empty()) std::ranges::rotate(out, std::ranges::upper_bound(out, *known->rbegin()));
+  if (!known->empty()) std::rotate(out.begin(), std::upper_bound(out.begin(), out.end(), *known->rbegin()), out.end());
   return out;
 }
 
