@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <vector>
 
 #include "calibration/base/lower_case.hpp"
@@ -295,15 +297,41 @@ std::string twice_in(const YAML::Node& map, int deeper = 1) {
   return {};
 }
 
+/// Makes nothing of what is read.
+struct Heedless final : YAML::EventHandler {
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
+/// Whether a text has more documents than anybody means. Of some damaged texts yaml-cpp reads the same piece for ever,
+/// as one document after another, and would keep each.
+bool has_no_end_of_documents(const std::string& text) {
+  constexpr int kMost = 16;
+  std::istringstream in(text);
+  YAML::Parser parser(in);
+  Heedless heedless;
+  int documents = 0;
+  while (documents <= kMost && parser.HandleNextDocument(heedless)) ++documents;
+  return documents > kMost;
+}
+
 /// The text as plain YAML; what parse makes of it may throw what yaml-cpp throws.
 template <typename Parse>
 auto of_yaml(const std::string& text, const Parse& parse) -> decltype(parse(YAML::Node())) {
+  const Error several{Errc::bad_format, "holds several documents (---); keep the one that is meant"};
   try {
+    if (has_no_end_of_documents(text)) return several;
     std::vector<YAML::Node> documents = YAML::LoadAll(text);
     // ROS prints "---" behind each message, behind which there may be none.
     std::erase_if(documents, [](const YAML::Node& document) { return document.IsNull(); });
-    if (documents.size() > 1)
-      return Error{Errc::bad_format, "holds several documents (---); keep the one that is meant"};
+    if (documents.size() > 1) return several;
     const YAML::Node root = documents.empty() ? YAML::Node() : documents.front();
     if (const std::string twice = twice_in(root); !twice.empty()) return stands_twice(twice);
     return parse(root);

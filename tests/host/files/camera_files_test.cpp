@@ -195,6 +195,16 @@ TEST(CameraFiles, OneThingUnderTwoNamesIsRefusedUnlessTheyAgree) {
   EXPECT_THAT(two.error().what, HasSubstr("lens.yaml: holds several documents (---)"));
 }
 
+/// Found by damaged inputs: yaml-cpp reads such a text for ever, and keeps each document that it makes of the same
+/// piece.
+TEST(CameraFiles, ATextWhoseDocumentsHaveNoEndIsRefused) {
+  const Scratch scratch;
+  const std::string endless = ",am0:\ncam0amer%.\nim\x01" + std::string(1, '\0') + "eimage_ha_";
+  const auto camera = read_camera(scratch.file("lens.yaml", endless));
+  ASSERT_FALSE(camera);
+  EXPECT_THAT(camera.error().what, HasSubstr("holds several documents"));
+}
+
 /// yaml-cpp and OpenCV count it by eights: 064 is 52.
 TEST(CameraFiles, AWholeNumberIsDecimal) {
   for (const std::string& text : {changed(kRos, "752", "0752"), changed(kMessage, "752", "0752"),
